@@ -9,8 +9,7 @@ import pytest
 from quadriga.pictures.mujoco_frames import add_stones
 from quadriga.shared.robot.conventions import GRAVITY, N_LEGS, Array
 from quadriga.shared.wire.codec import encode
-from quadriga.sim_server.terrain.loose import LooseStones
-from quadriga.sim_server.terrain.pebbles import Pebbles
+from quadriga.sim_server.terrain.pebbles import LooseStones, Pebbles
 from quadriga.sim_server.world.world import World
 from tests.a1 import TOTAL_MASS
 from tests.sim_server.standing import configured, shift, stand

@@ -1,4 +1,4 @@
-"""Ground given by its height over a grid: hills, ramps, or gravel whose stones do not move."""
+"""Ground that never moves: wooden blocks, stairs, and heights over a grid."""
 
 from __future__ import annotations
 
@@ -13,11 +13,22 @@ from scipy import ndimage
 
 from quadriga.shared.config.world import WorldConfig
 from quadriga.shared.robot.conventions import Array
-from quadriga.sim_server.terrain.contact import TERRAIN_CONTACT
-from quadriga.sim_server.terrain.course import Course, Rectangle
-from quadriga.sim_server.terrain.materials import EARTH, add_checker
-from quadriga.sim_server.terrain.relief import Relief
+from quadriga.sim_server.terrain.relief import (
+    EARTH,
+    TERRAIN_CONTACT,
+    Course,
+    Rectangle,
+    Relief,
+    add_checker,
+)
 
+_CELL: Final = 0.35  # m, one block per square of this size
+_SIZE: Final = (0.1, 0.4)  # m, range of the horizontal edges
+_LEAST_HEIGHT: Final = 0.2  # of the greatest height
+_AT_ONCE: Final = 64  # positions whose heights are computed together
+_BLOCK_RGBA: Final = ((0.72, 0.53, 0.30, 1.0), (0.80, 0.62, 0.38, 1.0), (0.62, 0.44, 0.24, 1.0))
+_LANDING: Final = 1.5  # m, between the last riser up and the first one down
+_STEP_RGBA: Final = ((0.66, 0.66, 0.64, 1.0), (0.58, 0.58, 0.57, 1.0))  # every second step
 _SUNK: Final = 0.01  # m, how far below the ground plane the field starts: no double contacts there
 _BASE: Final = 0.05  # m, thickness below the lowest point
 
@@ -35,6 +46,142 @@ _STONE_CELL: Final = 0.035  # m, one stone per square of this size
 _STONE_RADIUS: Final = (0.015, 0.03)  # m
 _STONE_HEIGHT: Final = 0.015  # m, how far the largest stone stands out of its bed
 _BED_LENGTH: Final = 0.15  # m, correlation length of the bed that the stones lie on
+
+
+@dataclass(frozen=True, slots=True)
+class Blocks(Relief):
+    """Blocks on the ground; where two overlap the higher one counts.
+
+    Attributes:
+        centre: horizontal centres, shape (b, 2), m, world.
+        half: half edge lengths along the block's own axes, shape (b, 2), m.
+        yaw: headings, shape (b,), rad.
+        tall: heights above the ground, shape (b,), m.
+    """
+
+    centre: Array
+    half: Array
+    yaw: Array
+    tall: Array
+
+    @property
+    def top(self) -> float:
+        """Height of the highest block, m."""
+        return float(self.tall.max(initial=0.0))
+
+    def height(self, x: Array, y: Array) -> Array:
+        """Height of the highest block at each position, or zero. Shape of x, m."""
+        x, y = np.asarray(x), np.asarray(y)
+        height = np.empty(x.size)
+        for first in range(0, x.size, _AT_ONCE):
+            part = slice(first, first + _AT_ONCE)
+            height[part] = self._heights(x.reshape(-1)[part], y.reshape(-1)[part])
+        return height.reshape(x.shape)
+
+    def _heights(self, x: Array, y: Array) -> Array:
+        """The same for so few positions that the processor's caches hold what is in between."""
+        dx = x[:, None] - self.centre[:, 0]
+        dy = y[:, None] - self.centre[:, 1]
+        cos, sin = np.cos(self.yaw), np.sin(self.yaw)
+        inside = np.abs(cos * dx + sin * dy) <= self.half[:, 0]
+        inside &= np.abs(cos * dy - sin * dx) <= self.half[:, 1]
+        height: Array = np.where(inside, self.tall, 0.0).max(axis=-1, initial=0.0)
+        return height
+
+    def add_to(self, spec: mujoco.MjSpec) -> None:
+        """Add one box geom per block to the world body."""
+        for i in range(len(self.tall)):
+            h = float(self.tall[i]) / 2.0
+            spec.worldbody.add_geom(
+                type=mujoco.mjtGeom.mjGEOM_BOX,
+                pos=[*self.centre[i], h],
+                size=[*self.half[i], h],
+                quat=[np.cos(self.yaw[i] / 2.0), 0.0, 0.0, np.sin(self.yaw[i] / 2.0)],
+                rgba=_BLOCK_RGBA[i % len(_BLOCK_RGBA)],
+                **TERRAIN_CONTACT,
+            )
+
+
+def build_blocks(course: Course, world: WorldConfig, random: np.random.Generator) -> Blocks:
+    """One block per cell of the course that the team's way needs, none on the flat place.
+
+    Args:
+        course: where the team starts and walks.
+        world: how high the highest block may be; heights are uniform in 0.2 … 1 of that.
+        random: the terrain's random stream.
+    """
+    extent = course.extent
+    x, y = np.meshgrid(
+        np.arange(extent.x_low, extent.x_high, _CELL), np.arange(extent.y_low, extent.y_high, _CELL)
+    )
+    centre = np.stack([x.ravel(), y.ravel()], axis=1)
+    centre += random.uniform(0.0, _CELL, centre.shape)
+    half = random.uniform(_SIZE[0] / 2.0, _SIZE[1] / 2.0, centre.shape)
+    yaw = random.uniform(0.0, np.pi, len(centre))
+    tall = world.terrain_height * random.uniform(_LEAST_HEIGHT, 1.0, len(centre))
+    clear = -course.flat.depth(centre[:, 0], centre[:, 1]) > np.hypot(half[:, 0], half[:, 1])
+    keep = clear & course.needs(centre[:, 0], centre[:, 1])
+    return Blocks(centre=centre[keep], half=half[keep], yaw=yaw[keep], tall=tall[keep])
+
+
+@dataclass(frozen=True, slots=True)
+class Stairs(Relief):
+    """Boxes on top of each other, each a tread shorter at both ends: their sides are the risers.
+
+    Attributes:
+        risers: where the risers up and down are, shape (count, 2), m along x, world.
+        sides: where the stairs end to the right and to the left, m along y, world.
+        rise: height of a step, m.
+    """
+
+    risers: Array
+    sides: tuple[float, float]
+    rise: float
+
+    @property
+    def top(self) -> float:
+        """Height of the landing, m."""
+        return len(self.risers) * self.rise
+
+    def height(self, x: Array, y: Array) -> Array:
+        """Height of the treads, or zero, at positions of any equal shape, m."""
+        beyond = np.asarray(x)[..., None]
+        steps = ((beyond >= self.risers[:, 0]) & (beyond <= self.risers[:, 1])).sum(axis=-1)
+        beside = (np.asarray(y) < self.sides[0]) | (np.asarray(y) > self.sides[1])
+        return np.where(beside, 0.0, self.rise * steps)
+
+    def add_to(self, spec: mujoco.MjSpec) -> None:
+        """Add one box geom per step to the world body."""
+        right, left = self.sides
+        for i, (near, far) in enumerate(self.risers.tolist()):
+            spec.worldbody.add_geom(
+                type=mujoco.mjtGeom.mjGEOM_BOX,
+                pos=[(near + far) / 2.0, (right + left) / 2.0, (i + 0.5) * self.rise],
+                size=[(far - near) / 2.0, (left - right) / 2.0, self.rise / 2.0],
+                rgba=_STEP_RGBA[i % len(_STEP_RGBA)],
+                **TERRAIN_CONTACT,
+            )
+
+
+def build_stairs(course: Course, world: WorldConfig, random: np.random.Generator) -> Stairs:
+    """Stairs at the end of the flat place, on the side that the way leads to along x.
+
+    Args:
+        course: where the team starts and walks.
+        world: how high, deep and many the steps are.
+        random: the terrain's random stream; up to a tread's depth the stairs begin later.
+    """
+    run, count = world.stairs_run, world.stairs_count
+    first = course.flat.x_high + run * random.uniform()
+    length = 2.0 * run * (count - 1) + _LANDING
+    if course.way[-1, 0] < 0.0:
+        first = course.flat.x_low - (first - course.flat.x_high) - length
+    near = first + run * np.arange(count)
+    return Stairs(
+        risers=np.stack([near, 2.0 * first + length - near], axis=1),
+        sides=course.extent.sides[1],
+        rise=world.stairs_rise,
+    )
 
 
 @dataclass(frozen=True, slots=True)
