@@ -13,12 +13,18 @@ from quadriga.shared.config.bridge import BridgeConfig
 from quadriga.shared.errors import BridgeError, ConfigError
 from quadriga.shared.robot.conventions import N_JOINTS
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns, sleep
-from quadriga.shared.unitree import go2, rpc
-from quadriga.shared.unitree.dds import DdsParticipant, StructReader, StructWriter
+from quadriga.shared.unitree import rpc
+from quadriga.shared.unitree.codecs import CODECS, GO2, Codec
+from quadriga.shared.unitree.dds import (
+    LOW_COMMANDS,
+    LOW_STATES,
+    DdsParticipant,
+    StructReader,
+    StructWriter,
+)
 from quadriga.shared.unitree.packets import ON, SERVO, MotorTargets, PacketError, RobotReport
 from quadriga.shared.unitree.rpc import RpcEnd, RpcMessage
-from quadriga.shared.unitree.udp import CODECS, UdpCodec
-from quadriga.shared.unitree.udp_port import Address, UdpPort, parse_address
+from quadriga.shared.unitree.udp import Address, UdpPort, parse_address
 
 _ROBOT: Final = Address("192.168.123.10", 8007)
 _LISTEN: Final = {"a1": Address("", 8080), "go1": Address("", 8090)}
@@ -104,7 +110,7 @@ class UdpDriver:
     def __init__(self, kind: str, config: BridgeConfig, *, sends_only: bool = False) -> None:
         robot = parse_address(config.endpoint, "bridge.endpoint", _ROBOT)
         listen = parse_address(config.listen, "bridge.listen", _LISTEN[kind])
-        self._codec: UdpCodec = CODECS[kind]
+        self._codec: Codec = CODECS[kind]
         self._port = UdpPort(Address(listen.host, 0) if sends_only else listen, robot)
         self._tick: int | None = None
         self._older = 0
@@ -181,14 +187,9 @@ class Go2Driver:
                 "bridge.interface", "nothing", "the one the robot hangs on, e.g. eth0"
             )
         self._participant = DdsParticipant(config.domain, config.interface)
-        commands = self._participant.struct_topic(go2.COMMAND_TOPIC, go2.COMMAND_TYPE, go2.COMMAND)
-        reports = self._participant.struct_topic(go2.REPORT_TOPIC, go2.REPORT_TYPE, go2.REPORT)
-        self._reports = StructReader(self._participant, reports, go2.REPORT.itemsize)
+        self._reports = StructReader(self._participant, LOW_STATES)
         # Healthy robots have writers of commands that never write: what they write is counted.
-        self._witness = StructReader(
-            self._participant, commands, go2.COMMAND.itemsize, of_others=True
-        )
-        self._commands_topic = commands
+        self._witness = StructReader(self._participant, LOW_COMMANDS, of_others=True)
         self._commands: StructWriter | None = None
         self.period_ms = config.period_ms or self.packets_ms
         self.malformed = self.released = ""
@@ -203,7 +204,7 @@ class Go2Driver:
         newest = None
         while (packet := self._reports.take()) is not None:
             try:
-                newest = go2.GO2.decode_report(packet)
+                newest = GO2.decode_report(packet)
             except PacketError as error:
                 self.malformed = count_malformed(self.counters, error)
                 continue
@@ -215,7 +216,7 @@ class Go2Driver:
 
     def send(self, targets: MotorTargets) -> None:
         """See `RobotDriver`. There is no writer of commands before `take_over`."""
-        sent = self._commands is not None and self._commands.send(go2.GO2.encode_command(targets))
+        sent = self._commands is not None and self._commands.send(GO2.encode_command(targets))
         self.counters["sent" if sent else "unsent"] += 1
 
     def other_writers(self) -> int:
@@ -296,7 +297,7 @@ class Go2Driver:
             now = monotonic()
 
     def _open_commands(self) -> None:
-        self._commands = StructWriter(self._participant, self._commands_topic, go2.COMMAND.itemsize)
+        self._commands = StructWriter(self._participant, LOW_COMMANDS)
 
     def _await_mode(self, controller: str) -> None:
         """Wait until this controller is in charge, or none if it is "".

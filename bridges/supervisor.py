@@ -39,8 +39,13 @@ from quadriga.shared.robot.conventions import JOINT_NAMES, N_JOINTS, Array
 from quadriga.shared.robot.motions import Motion, posture_at, way_down, way_up
 from quadriga.shared.robot.spec import RobotSpec
 from quadriga.shared.runtime.record import record
-from quadriga.shared.unitree.packets import PROTECTED, MotorTargets, RobotReport
-from quadriga.shared.unitree.remote import are_pressed, parse_buttons
+from quadriga.shared.unitree.packets import (
+    PROTECTED,
+    MotorTargets,
+    RobotReport,
+    are_pressed,
+    parse_buttons,
+)
 from quadriga.shared.wire.codes import with_detail
 from quadriga.shared.wire.messages import Command
 

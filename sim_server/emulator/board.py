@@ -19,24 +19,27 @@ import numpy as np
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.robot.conventions import N_JOINTS, Array, robot_names
-from quadriga.shared.unitree import go2, rpc
-from quadriga.shared.unitree.dds import DdsParticipant, StructReader, StructWriter
+from quadriga.shared.unitree import rpc
+from quadriga.shared.unitree.codecs import CODECS, GO2, Codec
+from quadriga.shared.unitree.dds import (
+    LOW_COMMANDS,
+    LOW_STATES,
+    DdsParticipant,
+    StructReader,
+    StructWriter,
+)
 from quadriga.shared.unitree.packets import (
     NO_ANGLE,
     OFF,
-    ON,
     PROTECTED,
-    SERVO,
     Battery,
     MotorTargets,
-    PacketCodec,
     PacketError,
     RobotReport,
+    remote_bytes,
 )
-from quadriga.shared.unitree.remote import RemoteReading, write_remote
 from quadriga.shared.unitree.rpc import RpcEnd, RpcMessage
-from quadriga.shared.unitree.udp import CODECS, UdpCodec
-from quadriga.shared.unitree.udp_port import Address, UdpPort, parse_address
+from quadriga.shared.unitree.udp import Address, UdpPort, parse_address
 from quadriga.shared.wire.messages import Command, State
 from quadriga.sim_server.emulator.link import NO_FAULTS, Link, Parcel
 
@@ -62,13 +65,13 @@ class RobotStatus:
     Attributes:
         first: what its counter says at tick 0.
         charge: of its battery, %.
-        remote: what its remote control sends, see `write_remote`.
+        remote: what its remote control sends, see `remote_bytes`.
         protected: motors that have switched themselves off, indices in `JOINT_NAMES`.
     """
 
     first: int = 0
     charge: float = 80.0
-    remote: bytes = write_remote(RemoteReading(True, frozenset()))
+    remote: bytes = remote_bytes()
     protected: set[int] = field(default_factory=set)
 
     def report(self, state: State, heat: Array, targets: MotorTargets | None) -> RobotReport:
@@ -121,16 +124,13 @@ class Board(ABC):
 
     Args:
         codec: of its packets.
-        servo: mode of a motor that follows its command.
         seed: of its chance.
         keeps_size: whether its network carries packets of one size only.
     """
 
     period_ms: int
 
-    def __init__(
-        self, codec: PacketCodec, servo: int, seed: Sequence[int], *, keeps_size: bool
-    ) -> None:
+    def __init__(self, codec: Codec, seed: Sequence[int], *, keeps_size: bool) -> None:
         self._codec = codec
         self.inwards, self.outwards = (Link((*seed, way), keeps_size=keeps_size) for way in (0, 1))
         self._chance = np.random.default_rng((*seed, 2))
@@ -138,7 +138,7 @@ class Board(ABC):
         self.status = RobotStatus(self._first)
         self._targets: MotorTargets | None = None
         self._second_writer: UdpPort | StructWriter | None = None
-        modes, zero = np.full(N_JOINTS, servo, np.uint8), np.zeros(N_JOINTS)
+        modes, zero = np.full(N_JOINTS, codec.servo, np.uint8), np.zeros(N_JOINTS)
         harmless = MotorTargets(modes, zero + NO_ANGLE, zero, zero, zero, zero + _DAMPING)
         self._second_command = codec.encode_command(harmless)
         self._now = 0  # ms
@@ -224,8 +224,8 @@ class UdpBoard(Board):
 
     period_ms = 1
 
-    def __init__(self, codec: UdpCodec, here: Address, seed: Sequence[int] = (0,)) -> None:
-        super().__init__(codec, SERVO, seed, keeps_size=False)
+    def __init__(self, codec: Codec, here: Address, seed: Sequence[int] = (0,)) -> None:
+        super().__init__(codec, seed, keeps_size=False)
         self._here, self._port = here, UdpPort(here)
         self._listener: Address | None = None
 
@@ -273,19 +273,15 @@ class Go2Board(Board):
     period_ms = 2
 
     def __init__(self, domain: int, interface: str, seed: Sequence[int] = (0,)) -> None:
-        super().__init__(go2.GO2, ON, seed, keeps_size=True)
+        super().__init__(GO2, seed, keeps_size=True)
         self._participant = DdsParticipant(domain, interface)
-        commands = self._participant.struct_topic(go2.COMMAND_TOPIC, go2.COMMAND_TYPE, go2.COMMAND)
-        reports = self._participant.struct_topic(go2.REPORT_TOPIC, go2.REPORT_TYPE, go2.REPORT)
-        self._commands = StructReader(
-            self._participant, commands, go2.COMMAND.itemsize, of_others=True
-        )
-        self._own_commands = StructWriter(self._participant, commands, go2.COMMAND.itemsize)
+        self._commands = StructReader(self._participant, LOW_COMMANDS, of_others=True)
+        self._own_commands = StructWriter(self._participant, LOW_COMMANDS)
+        self._reports = StructWriter(self._participant, LOW_STATES)
         zero = np.zeros(N_JOINTS)
         modes = np.full(N_JOINTS, OFF, np.uint8)
-        self._own_command = go2.GO2.encode_command(MotorTargets(modes, *[zero] * 5))
+        self._own_command = GO2.encode_command(MotorTargets(modes, *[zero] * 5))
         self._others = DdsParticipant(domain, interface)  # whoever is on its network, too
-        self._reports = StructWriter(self._participant, reports, go2.REPORT.itemsize)
         self._switcher = RpcEnd(self._participant, rpc.MOTION_SWITCHER, serves=True)
         self._sport = RpcEnd(self._participant, rpc.SPORT, serves=True)
         self.controller, self.lets_go = _CONTROLLER, True
@@ -333,8 +329,7 @@ class Go2Board(Board):
             self._switcher.send(RpcMessage(message.id, message.api, text, code))
 
     def _open_writer(self) -> StructWriter:
-        topic = self._others.struct_topic(go2.COMMAND_TOPIC, go2.COMMAND_TYPE, go2.COMMAND)
-        return StructWriter(self._others, topic, go2.COMMAND.itemsize)
+        return StructWriter(self._others, LOW_COMMANDS)
 
     def close(self) -> None:
         """Leave the network."""

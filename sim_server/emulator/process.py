@@ -34,7 +34,7 @@ from quadriga.shared.runtime.clock import Rate
 from quadriga.shared.runtime.collector import end_collection
 from quadriga.shared.runtime.scheduling import take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
-from quadriga.shared.unitree.remote import RemoteReading, parse_buttons, write_remote
+from quadriga.shared.unitree.packets import parse_buttons, remote_bytes
 from quadriga.shared.wire.messages import Command, Truth
 from quadriga.sim_server.emulator.board import Board, open_boards
 from quadriga.sim_server.world import layout
@@ -158,8 +158,7 @@ def _execute(board: Board, word: str, value: str) -> None:
             for link in (board.inwards, board.outwards):
                 link.faults = replace(link.faults, **{word: float(value)})
         case "remote":
-            buttons = parse_buttons(value, "command")
-            board.status.remote = write_remote(RemoteReading(True, buttons))
+            board.status.remote = remote_bytes(parse_buttons(value, "command"))
         case "battery":
             board.status.charge = float(value)
         case "protect":

@@ -30,11 +30,9 @@ from quadriga.plant.command_limits import MOST_KD, MOST_KP
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
 from quadriga.shared.runtime.clock import monotonic
-from quadriga.shared.unitree import udp
-from quadriga.shared.unitree.crc import crc32
-from quadriga.shared.unitree.go2 import GO2
-from quadriga.shared.unitree.packets import PacketCodec, PacketError, RobotReport
-from quadriga.shared.unitree.udp_port import Address, UdpPort
+from quadriga.shared.unitree.codecs import CODECS, GO2, Codec, seal
+from quadriga.shared.unitree.packets import PacketError, RobotReport
+from quadriga.shared.unitree.udp import Address, UdpPort
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.messages import Command
 from tests.bridges.robots import config_of, standing
@@ -60,7 +58,7 @@ class Link(NamedTuple):
         arrived: commands that reached the robot, as bytes.
     """
 
-    codec: PacketCodec
+    codec: Codec
     send: Callable[[bytes], None]
     receive: Callable[[], RobotReport | None]
     command: Callable[..., None]
@@ -79,7 +77,7 @@ def link_to(kind: str, config: Config) -> Iterator[Link]:
     driver = UdpDriver(kind, config_of(kind, **ends).bridge)
     try:
         yield Link(
-            udp.CODECS[kind],
+            CODECS[kind],
             lambda packet: _sent(robot.send(packet, bridge)),
             driver.receive,
             driver.send,
@@ -155,12 +153,6 @@ class Damage:
         return seal(packet.tobytes())
 
 
-def seal(packet: bytes) -> bytes:
-    """The packet with the check sum that belongs to it."""
-    covered = (len(packet) // 4 - 1) * 4
-    return packet[:-4] + crc32(packet[:covered]).to_bytes(4, "little")
-
-
 class Fuzz:
     """One robot and its bridge.
 
@@ -174,7 +166,7 @@ class Fuzz:
         self._supervisor = Supervisor(config.robot, config.bridge, servo=10)
         self._limits = joint_limits(config.bridge, config.robot)
         report = self._good = standing(config)
-        layout = None if kind == "go2" else udp.CODECS[kind].report
+        layout = None if kind == "go2" else CODECS[kind].report
         counter = None if layout is None or layout.fields is None else layout.fields["tick"][1]
         self._damage = Damage(link.codec.encode_report(report), seed, counter)
         good = np.stack([np.zeros(12), config.robot.q_stand, *np.ones((3, 12))])

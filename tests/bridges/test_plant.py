@@ -21,9 +21,9 @@ from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import CheckError
 from quadriga.shared.runtime.clock import sleep
+from quadriga.shared.unitree.codecs import A1
 from quadriga.shared.unitree.packets import OFF, SERVO, MotorTargets, RobotReport
-from quadriga.shared.unitree.udp import A1
-from quadriga.shared.unitree.udp_port import Address, UdpPort
+from quadriga.shared.unitree.udp import Address, UdpPort
 from quadriga.shared.wire.messages import Command, Status
 from tests.bridges.robots import config_of, real_go1_counts, standing, tilted
 from tests.bridges.test_udp_driver import HOST, free_port

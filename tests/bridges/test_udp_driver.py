@@ -13,9 +13,9 @@ from quadriga.bridges.drivers import UdpDriver
 from quadriga.bridges.plant import RobotPlant
 from quadriga.shared.config.bridge import BridgeConfig
 from quadriga.shared.errors import BridgeError, CheckError, ConfigError
+from quadriga.shared.unitree.codecs import A1, GO1
 from quadriga.shared.unitree.packets import OFF, SERVO, RobotReport
-from quadriga.shared.unitree.udp import A1, GO1
-from quadriga.shared.unitree.udp_port import Address, UdpPort
+from quadriga.shared.unitree.udp import Address, UdpPort
 from tests.bridges.robots import config_of, holding, standing
 
 HOST = "127.0.0.1"

@@ -17,8 +17,8 @@ from quadriga.desk.tables import build_fault_table, build_walk_table, is_too_slo
 from quadriga.shared.config.load import load
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.runtime.places import SOURCE
-from quadriga.shared.unitree.udp import A1
-from quadriga.shared.unitree.udp_port import Address
+from quadriga.shared.unitree.codecs import A1
+from quadriga.shared.unitree.udp import Address
 from quadriga.sim_server.emulator.board import UdpBoard
 from quadriga.sim_server.emulator.process import execute
 from quadriga.tables import Table

@@ -14,9 +14,9 @@ from quadriga.shared.config.bridge import BridgeConfig
 from quadriga.shared.config.load import load
 from quadriga.shared.errors import BridgeError, ConfigError
 from quadriga.shared.robot.conventions import JOINT_NAMES
+from quadriga.shared.unitree.codecs import A1
 from quadriga.shared.unitree.packets import NO_ANGLE, NO_RATE, OFF, PROTECTED, SERVO, RobotReport
-from quadriga.shared.unitree.udp import A1
-from quadriga.shared.unitree.udp_port import Address
+from quadriga.shared.unitree.udp import Address
 from quadriga.shared.wire.messages import Command
 from quadriga.sim_server.emulator.board import RobotStatus, UdpBoard, open_boards
 from quadriga.sim_server.emulator.link import LinkFaults

@@ -14,7 +14,7 @@ from quadriga.bridges.drivers import Go2Driver
 from quadriga.shared.config.bridge import BridgeConfig
 from quadriga.shared.config.load import load
 from quadriga.shared.runtime.clock import monotonic, sleep
-from quadriga.shared.unitree.remote import read_remote
+from quadriga.shared.unitree.packets import pressed_buttons
 from quadriga.shared.wire.messages import Command
 from quadriga.sim_server.emulator.board import Go2Board, RobotStatus
 from quadriga.sim_server.emulator.link import LinkFaults
@@ -126,6 +126,6 @@ def test_buttons_and_battery_reach_the_bridge(bench: Bench) -> None:
         report = bench.driver.receive()
         if report is None or report.battery is None:
             return False
-        return read_remote(report.remote).pressed == {"L2", "B"} and report.battery.charge == 8
+        return pressed_buttons(report.remote) == {"L2", "B"} and report.battery.charge == 8
 
     wait_until(seen)

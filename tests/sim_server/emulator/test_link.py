@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quadriga.shared.unitree import go2
+from quadriga.shared.unitree.codecs import GO2
 from quadriga.shared.unitree.packets import ON, MotorTargets, PacketError
 from quadriga.sim_server.emulator.link import Link, LinkFaults, Parcel
 
@@ -111,7 +111,7 @@ def test_swapped_packets_change_places_with_the_next() -> None:
 def test_damage_leaves_a_structs_size_alone_and_no_codec_takes_it(keeps_size: bool) -> None:
     zero = np.zeros(12)
     targets = MotorTargets(np.full(12, ON, np.uint8), zero, zero, zero, zero, zero + 3.0)
-    packet = go2.GO2.encode_command(targets)
+    packet = GO2.encode_command(targets)
     link = build(LinkFaults(garbage=1.0), keeps_size=keeps_size)
     sizes = set()
     for now in range(300):
@@ -119,7 +119,7 @@ def test_damage_leaves_a_structs_size_alone_and_no_codec_takes_it(keeps_size: bo
         sizes.add(len(got.packet))
         assert got.sender == SENDER
         with pytest.raises(PacketError):
-            go2.GO2.decode_command(got.packet)
+            GO2.decode_command(got.packet)
     assert (sizes == {len(packet)}) is keeps_size
 
 

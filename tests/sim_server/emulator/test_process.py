@@ -15,9 +15,9 @@ import pytest
 from quadriga.shared.config.load import load
 from quadriga.shared.robot.conventions import JOINT_NAMES, Array
 from quadriga.shared.runtime.clock import monotonic, sleep
-from quadriga.shared.unitree.remote import read_remote
-from quadriga.shared.unitree.udp import A1
-from quadriga.shared.unitree.udp_port import Address
+from quadriga.shared.unitree.codecs import A1
+from quadriga.shared.unitree.packets import pressed_buttons
+from quadriga.shared.unitree.udp import Address
 from quadriga.shared.wire.messages import Command
 from quadriga.sim_server.emulator.board import Board, UdpBoard
 from quadriga.sim_server.emulator.link import LinkFaults
@@ -55,7 +55,7 @@ def test_each_command_does_what_it_says(boards: dict[str, Board]) -> None:
     for board in boards.values():
         assert board.inwards.faults == board.outwards.faults == LinkFaults(0.5, 0.5, 0.5, 0.5, 0.5)
     status = boards["r1"].status
-    assert read_remote(status.remote).pressed == {"L2", "B"}
+    assert pressed_buttons(status.remote) == {"L2", "B"}
     assert (status.charge, status.protected) == (8.0, {JOINT_NAMES.index("FR_calf_joint")})
     assert boards["r2"].status.charge == 80.0
     assert boards["r1"]._second_writer is not None
