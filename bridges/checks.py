@@ -114,6 +114,10 @@ def refuse_failed(name: str, findings: Sequence[Finding]) -> None:
             )
 
 
+def _at_most(name: str, got: str, value: float, most: float, unit: str, cause: str) -> Finding:
+    return Finding(name, got, f"at most {most:g} {unit}", bool(value <= most), cause)
+
+
 def _check_ticks(reports: Sequence[RobotReport]) -> Finding:
     ticks = [report.tick for report in reports]
     rising = len(set(ticks)) > 0.9 * len(ticks)
@@ -138,21 +142,11 @@ def _check_motors(report: RobotReport, config: BridgeConfig, robot: RobotSpec) -
     limits = temperature_limits(config, robot)
     hottest = int(np.argmax(report.temperature - limits))
     heat, limit = report.temperature[hottest], limits[hottest]
+    cause, got = "switch the robot off and on again, let it cool", ", ".join(off) or "none"
+    hot = f"{JOINT_NAMES[hottest]} {heat:.0f} °C"
     return [
-        Finding(
-            "motors in protection mode",
-            ", ".join(off) or "none",
-            "none",
-            not off,
-            "switch the robot off and on again, let it cool",
-        ),
-        Finding(
-            "temperature",
-            f"{JOINT_NAMES[hottest]} {heat:.0f} °C",
-            f"at most {limit:g} °C",
-            bool(heat <= limit),
-            "let it cool",
-        ),
+        Finding("motors in protection mode", got, "none", not off, cause),
+        _at_most("temperature", hot, heat, limit, "°C", "let it cool"),
     ]
 
 
@@ -175,21 +169,11 @@ def _check_still(reports: Sequence[RobotReport]) -> list[Finding]:
     gyro = max(float(np.linalg.norm(report.gyro)) for report in reports)
     rates = np.array([np.abs(report.dq) for report in reports]).mean(axis=0)
     fastest = int(np.argmax(rates))
+    got = f"{JOINT_NAMES[fastest]} {rates[fastest]:.2f} rad/s"
+    cause = "its own controller still moves it, or it is being moved"
     return [
-        Finding(
-            "gyro",
-            f"{gyro:.2f} rad/s",
-            f"at most {_STILL_GYRO:g} rad/s",
-            gyro <= _STILL_GYRO,
-            "let it lie still",
-        ),
-        Finding(
-            "joint rates",
-            f"{JOINT_NAMES[fastest]} {rates[fastest]:.2f} rad/s",
-            f"at most {_STILL_JOINT:g} rad/s",
-            float(rates[fastest]) <= _STILL_JOINT,
-            "its own controller still moves it, or it is being moved",
-        ),
+        _at_most("gyro", f"{gyro:.2f} rad/s", gyro, _STILL_GYRO, "rad/s", "let it lie still"),
+        _at_most("joint rates", got, rates[fastest], _STILL_JOINT, "rad/s", cause),
     ]
 
 
@@ -201,28 +185,20 @@ def _check_gravity(reports: Sequence[RobotReport]) -> list[Finding]:
     tilt = tilt_of(attitude)
     cosine = float(_up_in_trunk(attitude) @ accel) / max(size, 1e-9)
     off = float(np.arccos(np.clip(cosine, -1.0, 1.0)))
+    normal = Finding(
+        "accelerometer",
+        f"{size:.1f} m/s²",
+        f"{GRAVITY:.1f} ± {_GRAVITY_OFF:g} m/s²",
+        abs(size - GRAVITY) <= _GRAVITY_OFF,
+        "is it being moved?",
+    )
+    lay = "lay it on its feet on level ground"
+    vertical = f"{off:.2f} rad off the accelerometer's vertical"
+    axes = "the order of the quaternion, or the axes of the IMU"
     return [
-        Finding(
-            "posture",
-            f"tilted by {tilt:.2f} rad",
-            f"at most {_FLAT:g} rad",
-            tilt <= _FLAT,
-            "lay it on its feet on level ground",
-        ),
-        Finding(
-            "accelerometer",
-            f"{size:.1f} m/s²",
-            f"{GRAVITY:.1f} ± {_GRAVITY_OFF:g} m/s²",
-            abs(size - GRAVITY) <= _GRAVITY_OFF,
-            "is it being moved?",
-        ),
-        Finding(
-            "attitude",
-            f"{off:.2f} rad off the accelerometer's vertical",
-            f"at most {_VERTICAL_OFF:g} rad",
-            off <= _VERTICAL_OFF,
-            "the order of the quaternion, or the axes of the IMU",
-        ),
+        _at_most("posture", f"tilted by {tilt:.2f} rad", tilt, _FLAT, "rad", lay),
+        normal,
+        _at_most("attitude", vertical, off, _VERTICAL_OFF, "rad", axes),
     ]
 
 
@@ -239,13 +215,9 @@ def _check_legs(report: RobotReport, robot: RobotSpec) -> Finding:
     """
     places, heights = _lowest_points(report, robot)
     off = _outside(places[heights <= _TOUCHES])
-    return Finding(
-        "legs",
-        f"its centre of mass {off:.2f} m beside what is lowest",
-        f"at most {_BESIDE:g} m",
-        off <= _BESIDE,
-        "legs in another order, a sign or a zero that is wrong, or it is held",
-    )
+    got = f"its centre of mass {off:.2f} m beside what is lowest"
+    cause = "legs in another order, a sign or a zero that is wrong, or it is held"
+    return _at_most("legs", got, off, _BESIDE, "m", cause)
 
 
 def _lowest_points(report: RobotReport, robot: RobotSpec) -> tuple[Array, Array]:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+from abc import ABC, abstractmethod
 from collections import Counter
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 import numpy as np
 
@@ -38,13 +39,7 @@ _WATCHED: Final = 0.3  # s, for which nobody else may write commands
 _STILL_S, _STILL = 1.0, 0.2  # s for which joints are slower, rad/s, when a robot has lain down
 
 
-def count_malformed(counters: Counter[str], error: PacketError) -> str:
-    """Count a packet as malformed, and by its reason; what is wrong with it."""
-    counters.update(("malformed", f"malformed_{error.reason}"))
-    return str(error)
-
-
-class RobotDriver(Protocol):
+class RobotDriver(ABC):
     """One robot on its own network.
 
     Attributes:
@@ -58,41 +53,52 @@ class RobotDriver(Protocol):
 
     servo: int
     packets_ms: int
-    period_ms: int
-    counters: Counter[str]
-    malformed: str
-    released: str
 
+    def __init__(self, period_ms: int = 0) -> None:
+        """With another period than that of the robot's packets, if one is given."""
+        self.period_ms = period_ms or self.packets_ms
+        self.malformed = self.released = ""
+        self.counters: Counter[str] = Counter()
+
+    @abstractmethod
     def receive(self) -> RobotReport | None:
         """The newest report that has come since the last call; None if there is none."""
-        ...
 
     def introduce(self) -> None:
         """Send one packet that enables no motor, if the robot reports to none but who sent one."""
-        ...
+        return
 
+    @abstractmethod
     def send(self, targets: MotorTargets) -> None:
         """Send a command. A packet that cannot be sent is counted, not an error."""
-        ...
 
     def other_writers(self) -> int:
         """How many others have commanded the motors since the last call, as far as is known."""
-        ...
+        return 0
 
     def take_over(self) -> None:
-        """Have the robot's own controller let go of the motors.
+        """Have the robot's own controller let go of the motors, if they have one to be asked.
 
         Raises:
             BridgeError: it does not.
         """
-        ...
+        return
 
+    @abstractmethod
     def close(self) -> None:
         """Leave the robot's network."""
-        ...
+
+    def _read(self, codec: Codec, packet: bytes) -> RobotReport | None:
+        """The report of a packet; what is damaged is counted, by its reason too."""
+        try:
+            return codec.decode_report(packet)
+        except PacketError as error:
+            self.counters.update(("malformed", f"malformed_{error.reason}"))
+            self.malformed = str(error)
+            return None
 
 
-class UdpDriver:
+class UdpDriver(RobotDriver):
     """See `RobotDriver`. Who else sends to the robot cannot be known over UDP.
 
     Args:
@@ -108,26 +114,20 @@ class UdpDriver:
     servo, packets_ms = SERVO, 1
 
     def __init__(self, kind: str, config: BridgeConfig, *, sends_only: bool = False) -> None:
+        super().__init__(config.period_ms)
         robot = parse_address(config.endpoint, "bridge.endpoint", _ROBOT)
         listen = parse_address(config.listen, "bridge.listen", _LISTEN[kind])
         self._codec: Codec = CODECS[kind]
         self._port = UdpPort(Address(listen.host, 0) if sends_only else listen, robot)
         self._tick: int | None = None
         self._older = 0
-        self.period_ms = config.period_ms or self.packets_ms
-        self.malformed = self.released = ""
-        self.counters: Counter[str] = Counter()
 
     def receive(self) -> RobotReport | None:
         """The newest report; damaged, foreign, repeated and older ones are counted."""
         newest = None
         for packet, _ in self._port.drain():
-            try:
-                report = self._codec.decode_report(packet)
-            except PacketError as error:
-                self.malformed = count_malformed(self.counters, error)
-                continue
-            if self._is_newer(report.tick):
+            report = self._read(self._codec, packet)
+            if report is not None and self._is_newer(report.tick):
                 newest = report
                 self.counters["received"] += 1
         return newest
@@ -155,19 +155,12 @@ class UdpDriver:
         sent = self._port.send(self._codec.encode_command(targets))
         self.counters["sent" if sent else "unsent"] += 1
 
-    def other_writers(self) -> int:
-        """Always 0: nobody tells."""
-        return 0
-
-    def take_over(self) -> None:
-        """Nothing to do: the operator has put the robot into its low-level mode."""
-
     def close(self) -> None:
         """See `RobotDriver`."""
         self._port.close()
 
 
-class Go2Driver:
+class Go2Driver(RobotDriver):
     """See `RobotDriver`.
 
     Args:
@@ -186,33 +179,25 @@ class Go2Driver:
             raise ConfigError(
                 "bridge.interface", "nothing", "the one the robot hangs on, e.g. eth0"
             )
+        super().__init__(config.period_ms)
         self._participant = DdsParticipant(config.domain, config.interface)
         self._reports = StructReader(self._participant, LOW_STATES)
         # Healthy robots have writers of commands that never write: what they write is counted.
         self._witness = StructReader(self._participant, LOW_COMMANDS, of_others=True)
         self._commands: StructWriter | None = None
-        self.period_ms = config.period_ms or self.packets_ms
-        self.malformed = self.released = ""
         if sends_only:
             self._open_commands()
         self._switcher = RpcEnd(self._participant, rpc.MOTION_SWITCHER, serves=False)
         self._sport = RpcEnd(self._participant, rpc.SPORT, serves=False)
-        self.counters: Counter[str] = Counter()
 
     def receive(self) -> RobotReport | None:
         """The newest report; what is damaged is counted."""
         newest = None
         while (packet := self._reports.take()) is not None:
-            try:
-                newest = GO2.decode_report(packet)
-            except PacketError as error:
-                self.malformed = count_malformed(self.counters, error)
-                continue
-            self.counters["received"] += 1
+            if (report := self._read(GO2, packet)) is not None:
+                newest = report
+                self.counters["received"] += 1
         return newest
-
-    def introduce(self) -> None:
-        """Nothing to do: a Go2 reports to all."""
 
     def send(self, targets: MotorTargets) -> None:
         """See `RobotDriver`. There is no writer of commands before `take_over`."""

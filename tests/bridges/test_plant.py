@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from collections import Counter
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
@@ -13,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from quadriga.bridges.drivers import open_driver
+from quadriga.bridges.drivers import RobotDriver, open_driver
 from quadriga.bridges.plant import RobotPlant, build_bridge, to_state, yaw_of
 from quadriga.bridges.supervisor import BridgeMode, Request
 from quadriga.bridges.watchdog import Watchdog
@@ -136,15 +135,14 @@ def test_a_bridge_that_was_silent_learns_at_once_that_its_watchdog_has_acted() -
     watchdog.dismiss()
 
 
-class Script:
+class Script(RobotDriver):
     """A driver whose robot speaks at given milliseconds of the bridge."""
 
-    servo, packets_ms, period_ms = SERVO, 2, 2
-    malformed = released = ""
+    servo, packets_ms = SERVO, 2
 
     def __init__(self, speaks: Iterator[bool]) -> None:
+        super().__init__()
         self._speaks, self.ms, self._spoken = speaks, 0, False
-        self.counters: Counter[str] = Counter()
 
     def pass_ms(self) -> None:
         """Let a millisecond pass.
@@ -158,15 +156,8 @@ class Script:
         spoken, self._spoken = self._spoken, False
         return standing(config_of(), tick=self.ms) if spoken else None
 
-    def introduce(self) -> None: ...
-
     def send(self, targets: MotorTargets) -> None:
         raise AssertionError("a dry run")
-
-    def other_writers(self) -> int:
-        return 0
-
-    def take_over(self) -> None: ...
 
     def close(self) -> None: ...
 
