@@ -60,7 +60,8 @@ class JointTester:
                 plant.take_charge()
                 rate = Rate(TICK, slack=3.0)
                 while not stopped() and plant.mode in (BridgeMode.PASSIVE, BridgeMode.TESTING):
-                    if supervised := plant.turn(Request.TEST):
+                    supervised = plant.turn(Request.TEST)
+                    if supervised is not None and plant.mode is BridgeMode.TESTING:
                         self._note(supervised)
                     rate.wait()
         finally:

@@ -6,14 +6,16 @@ import re
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, NamedTuple, TypeVar
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quadriga.bridges.joint_test import JointSample, JointVerdict, judge_joints, refuse_wrong, table
-from quadriga.bridges.postures import TORQUE, WAY, joint_motion, moving_joint
+from quadriga.bridges.drivers import RobotDriver
+from quadriga.bridges.joint_test import JointTester, JointVerdict, refuse_wrong, table
+from quadriga.bridges.postures import TORQUE, WAY, joint_motion, moving_joint, passive
 from quadriga.bridges.supervisor import BridgeMode, Request, Supervisor, SupervisorInputs
 from quadriga.shared.errors import CheckError
 from quadriga.shared.robot.conventions import JOINT_NAMES, Array
@@ -24,31 +26,44 @@ from tests.bridges.robots import config_of, pressing, standing
 CONFIG = config_of()
 SUPERVISOR = Supervisor(CONFIG.robot, CONFIG.bridge, SERVO)
 HANGING = np.tile([0.0, 0.8, -1.5], 4)
-STEP = 2  # ms
 INERTIA, FRICTION, GRAVITY = 0.05, 0.3, 4.0  # kg·m², N·m·s/rad, N·m/rad about where a leg hangs
 Commands = Callable[[MotorTargets], MotorTargets]
 Reports = Callable[[RobotReport], RobotReport]
 
 
-class Hanging:
+class Hanging(RobotDriver):
     """Twelve joints, each a pendulum with a motor of its own, behind what is planted."""
 
+    servo, packets_ms = SERVO, 2
+
     def __init__(self, commands: Commands, reports: Reports) -> None:
+        super().__init__()
         self._commands, self._reports = commands, reports
         self.q, self.dq, self.tau = HANGING.copy(), np.zeros(12), np.zeros(12)
+        self.ms, self._told, self._targets = 0, 0, passive(HANGING)
 
-    def report(self, tick: int) -> RobotReport:
+    def wait(self) -> None:
+        """Let a millisecond pass, at once."""
+        t = self._targets
+        self.tau = t.tau + t.kp * (t.q - self.q) + t.kd * (t.dq - self.dq)
+        self.tau = np.where(t.mode == OFF, 0.0, self.tau)
+        force = self.tau - GRAVITY * (self.q - HANGING) - FRICTION * self.dq
+        self.dq = self.dq + 1e-3 * force / INERTIA
+        self.q = self.q + 1e-3 * self.dq
+        self.ms += 1
+
+    def receive(self) -> RobotReport | None:
+        if self.ms - self._told < self.packets_ms:
+            return None
+        self._told = self.ms
+        self.counters["received"] += 1
         q, dq, tau = self.q.copy(), self.dq.copy(), self.tau.copy()
-        return self._reports(standing(CONFIG, tick=tick, q=q, dq=dq, tau=tau))
+        return self._reports(standing(CONFIG, tick=self.ms, q=q, dq=dq, tau=tau))
 
-    def obey(self, targets: MotorTargets) -> None:
-        t = self._commands(targets)
-        for _ in range(STEP):
-            self.tau = t.tau + t.kp * (t.q - self.q) + t.kd * (t.dq - self.dq)
-            self.tau = np.where(t.mode == OFF, 0.0, self.tau)
-            force = self.tau - GRAVITY * (self.q - HANGING) - FRICTION * self.dq
-            self.dq = self.dq + 1e-3 * force / INERTIA
-            self.q = self.q + 1e-3 * self.dq
+    def send(self, targets: MotorTargets) -> None:
+        self._targets = self._commands(targets)
+
+    def close(self) -> None: ...
 
 
 class Outcome(NamedTuple):
@@ -61,25 +76,16 @@ class Outcome(NamedTuple):
 
 
 def outcome_of(commands: Commands = lambda t: t, reports: Reports = lambda r: r) -> Outcome:
-    robot, state = Hanging(commands, reports), SUPERVISOR.initial(0, armed=True)
-    samples, motion, torque = list[JointSample](), joint_motion(HANGING, CONFIG.robot), 0.0
-    for now in range(0, round(1000 * motion.seconds) + 1200, STEP):
-        report = robot.report(now)
-        inputs = SupervisorInputs(now=now, report=report, report_age=0, request=Request.TEST)
-        if samples and state.mode is BridgeMode.PASSIVE:
-            break
-        state, supervised = SUPERVISOR.step(state, inputs)
-        assert supervised.targets is not None
-        if state.mode is BridgeMode.TESTING:
-            motion = state.motion or motion
-            seconds = (now - state.since) / 1000.0
-            targets, asked = supervised.targets, state.torque
-            samples.append(
-                JointSample(seconds, targets.q, asked, report.q, report.dq, report.tau, report.gyro)
-            )
-            torque = max(torque, float(np.abs(asked).max()))
-        robot.obey(supervised.targets)
-    return Outcome(judge_joints(samples, motion), state.mode, state.reason, torque)
+    robot, watchdog = Hanging(commands, reports), MagicMock()
+    with pytest.MonkeyPatch.context() as patch:
+        for module in ("plant", "joint_test"):
+            patch.setattr(f"quadriga.bridges.{module}.Rate", lambda *_, **__: robot)
+        tester = JointTester(CONFIG, "r1", robot, watchdog)
+        plant = tester._plant
+        plant._clock, plant._turned_at = lambda: 1e-3 * robot.ms, 0.0
+        verdicts = tester.run(bool)
+    torque = max(float(np.abs(sample.torque_asked).max()) for sample in tester._samples)
+    return Outcome(verdicts, plant.mode, plant.supervision.reason, torque)
 
 
 def swapped(values: Array) -> Array:
@@ -110,7 +116,7 @@ def off(values: Array) -> Array:
     return np.where(np.arange(12) == 8, 0.0, values)
 
 
-def test_a_sound_robot_passes_and_is_limp_at_the_end() -> None:
+def test_a_sound_robot_passes_and_is_passive_at_the_end() -> None:
     sound = outcome_of()
     refuse_wrong("r1", sound.verdicts)
     assert (sound.mode, sound.reason) == (BridgeMode.PASSIVE, "")
