@@ -54,14 +54,8 @@ _STIFFNESS, _DAMPING = 400.0, 8.0  # N·m/rad, N·m·s/rad of a harness
 _STDIN: Final = 0
 
 
-def run(
-    config: Config,
-    *,
-    hung: bool = False,
-    truth: Path | None = None,
-    stopped: Callable[[], bool] | None = None,
-) -> None:
-    """Be the robots until told to stop. They lie on the ground at first, or hang.
+def run(config: Config, *, hung: bool = False, truth: Path | None = None) -> None:
+    """Be the robots until SIGINT or SIGTERM. They lie on the ground at first, or hang.
 
     Args:
         config: the team's configuration; `bridge.endpoint`, or `bridge.interface`
@@ -69,14 +63,13 @@ def run(
         hung: whether they hang in the air.
         truth: gets where they truly are, as CSV every 10 ms: the tick in ms, then `TRUTH_COLUMNS`
             of each robot, world frame, m, m/s and rad/s; None: nothing does.
-        stopped: asked often whether to stop; by default a flag that SIGINT and SIGTERM raise.
 
     Raises:
         ConfigError: an address does not parse or is missing, or the file for the truth cannot be
             written.
         BridgeError: a port is taken, or there is no such interface.
     """
-    stopped = stopped or stop_on_signals()
+    stopped = stop_on_signals()
     world = World(replace(config, world=replace(config.world, spawn="lying")))
     harness = Harness(world) if hung else None
     with ExitStack() as stack:
