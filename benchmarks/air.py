@@ -34,7 +34,7 @@ from quadriga.shared.members import plant_name
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.runtime.signals import interrupt_on_sigterm
 from quadriga.shared.wire.topics import MEASUREMENT, PLAN, SAMPLE_MS
-from quadriga.sim_server.native.link import LinkFaults
+from quadriga.sim_server.emulator.link import LinkFaults
 from quadriga.tables import Table, print_tables
 
 _ROBOTS: Final = ("r1", "r2")

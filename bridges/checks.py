@@ -6,13 +6,14 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
+import pinocchio
 
 from quadriga.bridges.limits import temperature_limits
-from quadriga.bridges.statics import Statics
 from quadriga.bridges.supervisor import tilt_of
 from quadriga.shared.config.bridge import BridgeConfig
 from quadriga.shared.errors import CheckError
-from quadriga.shared.robot.conventions import GRAVITY, JOINT_NAMES, Array
+from quadriga.shared.robot.conventions import FOOT_FRAMES, GRAVITY, JOINT_NAMES, Array
+from quadriga.shared.robot.pinocchio_model import build_pinocchio_model
 from quadriga.shared.robot.spec import RobotSpec
 from quadriga.shared.unitree.packets import PROTECTED, RobotReport
 
@@ -24,6 +25,8 @@ _TOUCHES: Final = 0.05  # m above the lowest point of a robot, that may touch th
 _BESIDE: Final = 0.03  # m, of the centre of mass beside what bears it
 _DIRECTIONS: Final = 72
 _BEYOND: Final = 0.25  # rad beyond its range: a Go2 that lies has its calves 0.09 beyond it
+_LIMB_RADIUS: Final = 0.02  # m, of knees
+_HIP_RADIUS: Final = 0.04  # m, of the motors at hips
 
 
 class Finding(NamedTuple):
@@ -111,6 +114,10 @@ def refuse_failed(name: str, findings: Sequence[Finding]) -> None:
             )
 
 
+def _at_most(name: str, got: str, value: float, most: float, unit: str, cause: str) -> Finding:
+    return Finding(name, got, f"at most {most:g} {unit}", bool(value <= most), cause)
+
+
 def _check_ticks(reports: Sequence[RobotReport]) -> Finding:
     ticks = [report.tick for report in reports]
     rising = len(set(ticks)) > 0.9 * len(ticks)
@@ -135,21 +142,11 @@ def _check_motors(report: RobotReport, config: BridgeConfig, robot: RobotSpec) -
     limits = temperature_limits(config, robot)
     hottest = int(np.argmax(report.temperature - limits))
     heat, limit = report.temperature[hottest], limits[hottest]
+    cause, got = "switch the robot off and on again, let it cool", ", ".join(off) or "none"
+    hot = f"{JOINT_NAMES[hottest]} {heat:.0f} °C"
     return [
-        Finding(
-            "motors in protection mode",
-            ", ".join(off) or "none",
-            "none",
-            not off,
-            "switch the robot off and on again, let it cool",
-        ),
-        Finding(
-            "temperature",
-            f"{JOINT_NAMES[hottest]} {heat:.0f} °C",
-            f"at most {limit:g} °C",
-            bool(heat <= limit),
-            "let it cool",
-        ),
+        Finding("motors in protection mode", got, "none", not off, cause),
+        _at_most("temperature", hot, heat, limit, "°C", "let it cool"),
     ]
 
 
@@ -172,21 +169,11 @@ def _check_still(reports: Sequence[RobotReport]) -> list[Finding]:
     gyro = max(float(np.linalg.norm(report.gyro)) for report in reports)
     rates = np.array([np.abs(report.dq) for report in reports]).mean(axis=0)
     fastest = int(np.argmax(rates))
+    got = f"{JOINT_NAMES[fastest]} {rates[fastest]:.2f} rad/s"
+    cause = "its own controller still moves it, or it is being moved"
     return [
-        Finding(
-            "gyro",
-            f"{gyro:.2f} rad/s",
-            f"at most {_STILL_GYRO:g} rad/s",
-            gyro <= _STILL_GYRO,
-            "let it lie still",
-        ),
-        Finding(
-            "joint rates",
-            f"{JOINT_NAMES[fastest]} {rates[fastest]:.2f} rad/s",
-            f"at most {_STILL_JOINT:g} rad/s",
-            float(rates[fastest]) <= _STILL_JOINT,
-            "its own controller still moves it, or it is being moved",
-        ),
+        _at_most("gyro", f"{gyro:.2f} rad/s", gyro, _STILL_GYRO, "rad/s", "let it lie still"),
+        _at_most("joint rates", got, rates[fastest], _STILL_JOINT, "rad/s", cause),
     ]
 
 
@@ -198,28 +185,20 @@ def _check_gravity(reports: Sequence[RobotReport]) -> list[Finding]:
     tilt = tilt_of(attitude)
     cosine = float(_up_in_trunk(attitude) @ accel) / max(size, 1e-9)
     off = float(np.arccos(np.clip(cosine, -1.0, 1.0)))
+    normal = Finding(
+        "accelerometer",
+        f"{size:.1f} m/s²",
+        f"{GRAVITY:.1f} ± {_GRAVITY_OFF:g} m/s²",
+        abs(size - GRAVITY) <= _GRAVITY_OFF,
+        "is it being moved?",
+    )
+    lay = "lay it on its feet on level ground"
+    vertical = f"{off:.2f} rad off the accelerometer's vertical"
+    axes = "the order of the quaternion, or the axes of the IMU"
     return [
-        Finding(
-            "posture",
-            f"tilted by {tilt:.2f} rad",
-            f"at most {_FLAT:g} rad",
-            tilt <= _FLAT,
-            "lay it on its feet on level ground",
-        ),
-        Finding(
-            "accelerometer",
-            f"{size:.1f} m/s²",
-            f"{GRAVITY:.1f} ± {_GRAVITY_OFF:g} m/s²",
-            abs(size - GRAVITY) <= _GRAVITY_OFF,
-            "is it being moved?",
-        ),
-        Finding(
-            "attitude",
-            f"{off:.2f} rad off the accelerometer's vertical",
-            f"at most {_VERTICAL_OFF:g} rad",
-            off <= _VERTICAL_OFF,
-            "the order of the quaternion, or the axes of the IMU",
-        ),
+        _at_most("posture", f"tilted by {tilt:.2f} rad", tilt, _FLAT, "rad", lay),
+        normal,
+        _at_most("attitude", vertical, off, _VERTICAL_OFF, "rad", axes),
     ]
 
 
@@ -234,15 +213,36 @@ def _check_legs(report: RobotReport, robot: RobotSpec) -> Finding:
     A leg in another place, of another sign or with another zero would reach into the ground, and
     alone be lowest: then the centre of mass is not above what bears it.
     """
-    places, heights = Statics(robot).lowest_points(report)
+    places, heights = _lowest_points(report, robot)
     off = _outside(places[heights <= _TOUCHES])
-    return Finding(
-        "legs",
-        f"its centre of mass {off:.2f} m beside what is lowest",
-        f"at most {_BESIDE:g} m",
-        off <= _BESIDE,
-        "legs in another order, a sign or a zero that is wrong, or it is held",
-    )
+    got = f"its centre of mass {off:.2f} m beside what is lowest"
+    cause = "legs in another order, a sign or a zero that is wrong, or it is held"
+    return _at_most("legs", got, off, _BESIDE, "m", cause)
+
+
+def _lowest_points(report: RobotReport, robot: RobotSpec) -> tuple[Array, Array]:
+    """Where the robot is lowest: feet, knees, hips and the corners of its trunk.
+
+    Returns:
+        Their places from the centre of mass, horizontally, (20, 2), and their heights over the
+        lowest of them, (20,), m; world axes.
+    """
+    model = build_pinocchio_model(robot)
+    data = model.createData()
+    w, x, y, z = report.quat_wxyz / np.linalg.norm(report.quat_wxyz)
+    q = np.array([0.0, 0.0, 0.0, x, y, z, w, *report.q])
+    com = pinocchio.centerOfMass(model, data, q)
+    pinocchio.updateFramePlacements(model, data)
+    box = np.array(np.meshgrid(*([-half, half] for half in np.array(robot.trunk_box) / 2)))
+    feet = [data.oMf[model.getFrameId(foot)].translation for foot in FOOT_FRAMES]
+    points = [
+        *(foot - [0.0, 0.0, robot.geometry.foot_radius] for foot in feet),
+        *(data.oMi[k].translation - [0.0, 0.0, _LIMB_RADIUS] for k in range(4, 14, 3)),
+        *(data.oMi[k].translation - [0.0, 0.0, _HIP_RADIUS] for k in range(3, 14, 3)),
+        *(box.reshape(3, 8).T @ data.oMi[1].rotation.T),
+    ]
+    places = np.array(points) - com
+    return places[:, :2], places[:, 2] - places[:, 2].min()
 
 
 def _outside(places: Array) -> float:

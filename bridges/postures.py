@@ -1,31 +1,29 @@
-"""Motions that a bridge makes itself, with its gains: up, down, and what it is while at rest."""
+"""Motions that a bridge makes itself, up, down, at rest, and one joint at a time."""
 
 from __future__ import annotations
 
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from quadriga.shared.config.bridge import BridgeConfig
-from quadriga.shared.robot.conventions import N_JOINTS, N_LEGS, Array
-from quadriga.shared.robot.motions import Motion, way_down, way_up
+from quadriga.shared.robot.conventions import JOINT_NAMES, N_JOINTS, Array
+from quadriga.shared.robot.motions import Motion
 from quadriga.shared.robot.spec import RobotSpec
 from quadriga.shared.unitree.packets import OFF, MotorTargets
 
 DAMPING: Final = 3.0  # N·m·s/rad, of joints that are damped
 SINKING: Final = 8.0  # likewise, with which a robot on folded legs comes down on its belly
-_PRESSED: Final = 0.6  # of a foot's share of the weight that is put on it, or taken off
-
-
-def stand_up(q: Array, robot: RobotSpec, config: BridgeConfig) -> Motion:
-    """From measured angles to the stand; from lying with folded legs it takes `stand_s`."""
-    return way_up(q, robot, config.stand_s)
-
-
-def lie_down(q: Array, robot: RobotSpec, config: BridgeConfig) -> Motion:
-    """From measured angles down to the folded posture; from the stand it takes `stand_s`."""
-    return way_down(q, robot, config.stand_s)
+WAY: Final = 0.15  # rad that a joint moves
+KP: Final = 60.0  # N·m/rad, that holds a hanging leg
+KD: Final = 2.0  # N·m·s/rad
+TORQUE: Final = 8.0  # N·m, the most that any joint gives
+MOST_TRACKING_ERROR: Final = 0.4  # rad off its posture at which a joint stops the test
+_OUTWARDS: Final = np.array([1.0, -1.0, 1.0, -1.0])  # sign of a hip's angle, FL FR RL RR
+_ROOM: Final = 0.05  # rad that is kept free before an end stop
+_BEGIN: Final = 2.0  # s, in which the motors gain their stiffness
+_HALF: Final = 0.5  # s, there, and back
+_REST: Final = 0.2  # s, before the next joint
 
 
 def stay(q: Array, seconds: float) -> Motion:
@@ -33,39 +31,71 @@ def stay(q: Array, seconds: float) -> Motion:
     return Motion(np.stack([q, q]), np.array([seconds]))
 
 
-def press_by_diagonals(robot: RobotSpec, config: BridgeConfig) -> Motion:
-    """From the stand, the weight more on one diagonal of feet, then on the other, and back.
-
-    The trunk stays where it is: the forces that are added cancel each other. So robots that are
-    yoked do not pull at each other. A joint that is asked for an angle that is off by δτ / k_p
-    gives δτ more; for a foot that is under its hip, all of it is the calf's.
-    """
-    lever = robot.geometry.link * np.sin(robot.q_stand[1])  # m, of the foot from its knee
-    more = _PRESSED * robot.weight / N_LEGS * lever / config.stand_kp
-    first = robot.q_stand.copy()
-    first[2::3] += np.array([more, -more, -more, more])
-    second = 2.0 * robot.q_stand - first
-    postures = [robot.q_stand, first, first, second, second, robot.q_stand]
-    return Motion(np.stack(postures), np.cumsum([0.5, 0.4, 0.8, 0.4, 0.5]))
-
-
 def towards(q: Array, dq: Array, mode: int, config: BridgeConfig) -> MotorTargets:
     """The command that leads the joints through a posture with the bridge's gains."""
-    gains = np.full(N_JOINTS, config.stand_kp), np.full(N_JOINTS, config.stand_kd)
-    return MotorTargets(_modes(mode), q, dq, np.zeros(N_JOINTS), *gains)
+    return _targets(mode, q, dq, config.stand_kp, config.stand_kd)
 
 
 def damped(q: Array, mode: int, damping: float = DAMPING) -> MotorTargets:
     """The command that damps all joints, by default as those of a robot that stops."""
-    zero = np.zeros(N_JOINTS)
-    return MotorTargets(_modes(mode), q, zero, zero, zero, np.full(N_JOINTS, damping))
+    return _targets(mode, q, np.zeros(N_JOINTS), 0.0, damping)
 
 
 def passive(q: Array) -> MotorTargets:
     """The command that switches all motors off."""
-    zero = np.zeros(N_JOINTS)
-    return MotorTargets(_modes(OFF), q, zero, zero, zero, zero)
+    return _targets(OFF, q, np.zeros(N_JOINTS), 0.0, 0.0)
 
 
-def _modes(mode: int) -> NDArray[np.uint8]:
-    return np.full(N_JOINTS, mode, dtype=np.uint8)
+def _targets(mode: int, q: Array, dq: Array, kp: float, kd: float) -> MotorTargets:
+    modes, gains = np.full(N_JOINTS, mode, dtype=np.uint8), np.full((2, N_JOINTS), [[kp], [kd]])
+    return MotorTargets(modes, q, dq, np.zeros(N_JOINTS), *gains)
+
+
+def joint_motion(q: Array, robot: RobotSpec) -> Motion:
+    """The motion of all joints from measured angles.
+
+    Joints at their stops are led off them, and legs that hang inwards side by side: there they
+    touch. For the same reason hips move outwards. All other angles are kept.
+
+    Of its postures, 1 + 3 k is where joint k begins, 2 + 3 k its turning point and 3 + 3 k where it
+    is back; the first is where the motors are switched on.
+    """
+    lower, upper = np.array(robot.lower) + _ROOM, np.array(robot.upper) - _ROOM
+    base = np.clip(q, lower, upper)
+    base[::3] = _OUTWARDS * np.maximum(_OUTWARDS * base[::3], 0.0)
+    sign = np.where(base + WAY <= upper, 1.0, -1.0)
+    roomy = _OUTWARDS * base[::3] + WAY <= np.minimum(upper[::3], -lower[::3])
+    sign[::3] = np.where(roomy, _OUTWARDS, -_OUTWARDS)
+    postures, times = [q, base], [_BEGIN]
+    for k in range(N_JOINTS):
+        way = np.zeros(N_JOINTS)
+        way[k] = sign[k] * WAY
+        postures += [base + way, base, base]
+        times += [_HALF, _HALF, _REST]
+    return Motion(np.stack(postures), np.cumsum(times))
+
+
+def moving_joint(motion: Motion, seconds: float) -> int | None:
+    """Which joint moves then, or rests after it has moved; None before the first."""
+    k = (int(np.searchsorted(motion.ends, seconds, side="right")) - 1) // 3
+    return None if seconds < _BEGIN else min(k, N_JOINTS - 1)
+
+
+def led_gently(q: Array, dq: Array, mode: int, seconds: float) -> MotorTargets:
+    """The command that leads the joints, softly at first: a wrong order or sign shows early.
+
+    Args:
+        q: where to, (12,), rad.
+        dq: likewise, rad/s.
+        mode: in which the motors follow.
+        seconds: since the motors were switched on.
+    """
+    return _targets(mode, q, dq, min(1.0, seconds / _BEGIN) * KP, KD)
+
+
+def tracking_error(q: Array, asked: Array) -> str:
+    """The joint that is farthest off what is asked for, with by how much; "" if all are near."""
+    off = q - asked
+    worst = int(np.argmax(np.abs(off)))
+    far = abs(off[worst]) > MOST_TRACKING_ERROR
+    return f"{JOINT_NAMES[worst]} {off[worst]:+.2f} rad" if far else ""

@@ -1,4 +1,4 @@
-"""What a bridge lets its robot do: ten states, a command a millisecond, every reason to stop.
+"""What a bridge lets its robot do: nine states, a command a millisecond, every reason to stop.
 
 The supervisor knows no agent, bus or socket. It is told what the robot last said, what the agent
 last asked for and how old both are, and it gives the command that may be sent.
@@ -7,13 +7,15 @@ last asked for and how old both are, and it gives the command that may be sent.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
+from enum import StrEnum
+from types import MappingProxyType
 from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from quadriga.bridges.joint_motion import TORQUE, joint_motion, led_gently, stray
 from quadriga.bridges.limits import (
     JointReading,
     joint_limits,
@@ -21,29 +23,83 @@ from quadriga.bridges.limits import (
     shares_of_speed,
     temperature_limits,
 )
-from quadriga.bridges.modes import BY_ITSELF, BY_WISH, BridgeMode, Wish
 from quadriga.bridges.postures import (
     SINKING,
+    TORQUE,
     damped,
-    lie_down,
+    joint_motion,
+    led_gently,
     passive,
-    press_by_diagonals,
-    stand_up,
     stay,
     towards,
+    tracking_error,
 )
 from quadriga.shared.config.bridge import BridgeConfig
 from quadriga.shared.robot.conventions import JOINT_NAMES, N_JOINTS, Array
-from quadriga.shared.robot.motions import Motion, posture_at
+from quadriga.shared.robot.motions import Motion, posture_at, way_down, way_up
 from quadriga.shared.robot.spec import RobotSpec
 from quadriga.shared.runtime.record import record
-from quadriga.shared.unitree.packets import PROTECTED, MotorTargets, RobotReport
-from quadriga.shared.unitree.remote import are_pressed, parse_buttons
+from quadriga.shared.unitree.packets import (
+    PROTECTED,
+    MotorTargets,
+    RobotReport,
+    are_pressed,
+    parse_buttons,
+)
 from quadriga.shared.wire.codes import with_detail
 from quadriga.shared.wire.messages import Command
 
+TRACKING_ERROR: Final = "tracking-error"  # why a test of joints is stopped
 _HOTTER: Final = 8.0  # °C above `temperature_max` that stop a robot: its motors end at 10 more
-_LETTING_GO: Final = 1.0  # s, for which a robot that has lain down is damped
+_RELEASING: Final = 1.0  # s, for which a robot that has lain down is damped
+
+
+class BridgeMode(StrEnum):
+    """What a bridge does with its robot."""
+
+    DRY = "dry"  # no motor is ever enabled
+    PASSIVE = "passive"  # motors off
+    STANDING_UP = "standing-up"
+    STANDING = "standing"
+    WALKING = "walking"  # the agent's commands, limited
+    LYING_DOWN = "lying-down"
+    TESTING = "testing"  # it hangs, and one joint after the other moves a little
+    RELEASING = "releasing"  # damped, then passive
+    STOPPED = "stopped"  # damped, then motors off, until the bridge is started again
+
+
+class Request(StrEnum):
+    """What the team, or a test, wants of the robot."""
+
+    REST = "rest"
+    STAND = "stand"
+    WALK = "walk"
+    LIE = "lie"
+    TEST = "test"
+
+
+_UPRIGHT: Final = (BridgeMode.STANDING_UP, BridgeMode.STANDING, BridgeMode.WALKING)
+BY_REQUEST: Final[Mapping[tuple[BridgeMode, Request], BridgeMode]] = MappingProxyType(
+    {
+        (BridgeMode.PASSIVE, Request.STAND): BridgeMode.STANDING_UP,
+        (BridgeMode.PASSIVE, Request.TEST): BridgeMode.TESTING,
+        (BridgeMode.STANDING, Request.WALK): BridgeMode.WALKING,
+        **{(mode, Request.LIE): BridgeMode.LYING_DOWN for mode in _UPRIGHT},
+        **{(BridgeMode.TESTING, request): BridgeMode.RELEASING for request in Request},
+        (BridgeMode.TESTING, Request.TEST): BridgeMode.TESTING,
+    }
+)
+"""The state that a request leads to; from any other nothing changes."""
+
+BY_ITSELF: Final[Mapping[BridgeMode, BridgeMode]] = MappingProxyType(
+    {
+        BridgeMode.STANDING_UP: BridgeMode.STANDING,
+        BridgeMode.LYING_DOWN: BridgeMode.RELEASING,
+        BridgeMode.TESTING: BridgeMode.RELEASING,
+        BridgeMode.RELEASING: BridgeMode.PASSIVE,
+    }
+)
+"""The state that follows when a motion is over."""
 
 
 @record
@@ -51,7 +107,7 @@ class SupervisorState:
     """What a supervisor remembers.
 
     Attributes:
-        mode: which of the ten.
+        mode: which of the nine.
         reason: why it is stopped; "" otherwise.
         since: when the mode began, ms.
         motion: that the bridge makes itself.
@@ -81,10 +137,10 @@ class SupervisorInputs:
         report_age: ms since it came.
         command: the agent's newest; None before the first.
         command_age: ms.
-        wish: of the team.
+        request: of the team.
         writers: how many others have commanded the robot's motors since the step before.
         stall: ms since the step before, by the clock.
-        guarded: whether the bridge's guard is there.
+        watched: whether the bridge's watchdog is there.
         estop: why the team's emergency stop was pressed; "" if it was not.
     """
 
@@ -93,10 +149,10 @@ class SupervisorInputs:
     report_age: int
     command: Command | None = None
     command_age: int = 0
-    wish: Wish = Wish.REST
+    request: Request = Request.REST
     writers: int = 0
     stall: int = 1
-    guarded: bool = True
+    watched: bool = True
     estop: str = ""
 
 
@@ -139,8 +195,8 @@ class Supervisor:
         shares_of_speed(still.q, still.dq, self._fastest, self._limits)
 
     def initial(self, now: int, *, armed: bool) -> SupervisorState:
-        """Dry, or limp if it may command the robot."""
-        mode = BridgeMode.LIMP if armed else BridgeMode.DRY
+        """Dry, or passive if it may command the robot."""
+        mode = BridgeMode.PASSIVE if armed else BridgeMode.DRY
         return SupervisorState(mode, "", now, None, None, np.zeros(N_JOINTS), now)
 
     def step(
@@ -166,9 +222,12 @@ class Supervisor:
             return state
         if reason := self.reason_to_stop(state, inputs):
             return _begin(state, BridgeMode.STOPPED, inputs.now, reason)
-        if state.mode is BridgeMode.TESTING and (joint := self._stray(state, inputs)):
-            return _begin(state, BridgeMode.STOPPED, inputs.now, with_detail("joint-strays", joint))
-        mode = BY_WISH.get((state.mode, inputs.wish), state.mode)
+        if state.mode is BridgeMode.TESTING and (
+            joint := tracking_error(inputs.report.q, self._posture(state, inputs)[0])
+        ):
+            reason = with_detail(TRACKING_ERROR, joint)
+            return _begin(state, BridgeMode.STOPPED, inputs.now, reason)
+        mode = BY_REQUEST.get((state.mode, inputs.request), state.mode)
         if mode is BridgeMode.WALKING and not self._is_fresh(inputs):
             return state
         if mode is state.mode and self._is_over(state, inputs):
@@ -179,18 +238,16 @@ class Supervisor:
 
     def _motion(self, mode: BridgeMode, q: Array) -> Motion | None:
         """The motion that a mode makes from measured angles, if it makes one."""
-        if mode is BridgeMode.STANDING_UP:
-            return stand_up(q, self._robot, self._config)
-        if mode is BridgeMode.LYING_DOWN:
-            return lie_down(q, self._robot, self._config)
-        if mode is BridgeMode.WEIGHING:
-            return press_by_diagonals(self._robot, self._config)
-        if mode is BridgeMode.TESTING:
-            return joint_motion(q, self._robot)
-        return stay(q, _LETTING_GO) if mode is BridgeMode.LETTING_GO else None
-
-    def _stray(self, state: SupervisorState, inputs: SupervisorInputs) -> str:
-        return stray(inputs.report.q, self._posture(state, inputs)[0])
+        match mode:
+            case BridgeMode.STANDING_UP:
+                return way_up(q, self._robot, self._config.stand_s)
+            case BridgeMode.LYING_DOWN:
+                return way_down(q, self._robot, self._config.stand_s)
+            case BridgeMode.TESTING:
+                return joint_motion(q, self._robot)
+            case BridgeMode.RELEASING:
+                return stay(q, _RELEASING)
+        return None
 
     def _note_rates(self, state: SupervisorState, inputs: SupervisorInputs) -> SupervisorState:
         """The state with the time for which some joint has been too fast, or cannot be believed."""
@@ -208,14 +265,14 @@ class Supervisor:
             return with_detail("estop", inputs.estop)
         if are_pressed(report.remote, self._stop_buttons):
             return with_detail("remote", config.stop_buttons)
-        # Once the guard has damped the motors, it is who else has commanded them.
-        if inputs.stall > config.damp_ms and mode is not BridgeMode.LIMP:
+        # Once the watchdog has damped the motors, it is who else has commanded them.
+        if inputs.stall > config.damp_ms and mode is not BridgeMode.PASSIVE:
             return with_detail("bridge-late", f"{inputs.stall} ms")
-        if not inputs.guarded:
-            return "guard-gone"
+        if not inputs.watched:
+            return "watchdog-gone"
         if inputs.writers:
             return with_detail("second-writer", f"{inputs.writers} others command the motors")
-        if mode is BridgeMode.LIMP:
+        if mode is BridgeMode.PASSIVE:
             return ""
         if inputs.report_age > config.report_max_ms:
             return with_detail("report-late", f"{inputs.report_age} ms")
@@ -260,23 +317,27 @@ class Supervisor:
         self, state: SupervisorState, inputs: SupervisorInputs
     ) -> tuple[SupervisorState, MotorTargets]:
         """What the mode asks of the motors, before it is limited."""
-        mode, q = state.mode, inputs.report.q
-        if mode is BridgeMode.LIMP:
-            return state, passive(q)
-        if mode is BridgeMode.STOPPED:
-            off = inputs.now - state.since > 1000.0 * self._config.passive_s
-            return state, passive(q) if off else damped(q, self._servo)
-        if mode is BridgeMode.WALKING:
-            return self._follow(state, inputs)
-        if mode is BridgeMode.STANDING:
-            still = np.zeros(N_JOINTS)
-            return state, towards(self._robot.q_stand, still, self._servo, self._config)
-        if mode is BridgeMode.LETTING_GO:
-            return state, damped(q, self._servo, SINKING)
-        posture = self._posture(state, inputs)
-        if mode is BridgeMode.TESTING:
-            return state, led_gently(*posture, self._servo, self._seconds(state, inputs))
-        return state, towards(*posture, self._servo, self._config)
+        q = inputs.report.q
+        match state.mode:
+            case BridgeMode.PASSIVE:
+                return state, passive(q)
+            case BridgeMode.STOPPED:
+                off = inputs.now - state.since > 1000.0 * self._config.passive_s
+                return state, passive(q) if off else damped(q, self._servo)
+            case BridgeMode.WALKING:
+                return self._follow(state, inputs)
+            case BridgeMode.STANDING:
+                return state, self._hold(self._robot.q_stand)
+            case BridgeMode.RELEASING:
+                return state, damped(q, self._servo, SINKING)
+            case BridgeMode.TESTING:
+                now = self._seconds(state, inputs)
+                return state, led_gently(*self._posture(state, inputs), self._servo, now)
+        return state, towards(*self._posture(state, inputs), self._servo, self._config)
+
+    def _hold(self, q: Array) -> MotorTargets:
+        """The command that holds the joints at these angles."""
+        return towards(q, np.zeros(N_JOINTS), self._servo, self._config)
 
     def _posture(self, state: SupervisorState, inputs: SupervisorInputs) -> tuple[Array, Array]:
         """Angles and rates of the motion now, (12,) each, rad and rad/s."""
@@ -297,8 +358,7 @@ class Supervisor:
             return (state if state.held is None else replace(state, held=None)), targets
         if state.held is None:
             state = replace(state, held=inputs.report.q.copy())
-        still = np.zeros(N_JOINTS)
-        return state, towards(np.asarray(state.held), still, self._servo, self._config)
+        return state, self._hold(np.asarray(state.held))
 
     def _is_fresh(self, inputs: SupervisorInputs) -> bool:
         return inputs.command is not None and inputs.command_age <= self._config.hold_ms

@@ -33,7 +33,7 @@ def add(add_command: AddCommand) -> None:
 
 def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     """Bridge the robot until the walk is over."""
-    from quadriga.bridges.bridge import build_bridge
+    from quadriga.bridges.plant import build_bridge
     from quadriga.plant import process
     from quadriga.shared.robot.conventions import robot_names
     from quadriga.shared.runtime.signals import stop_on_signals
@@ -63,8 +63,8 @@ def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
 
 
 def _restore(config: Config, name: str, controller: str) -> int:
-    from quadriga.bridges.bridge import bridge_of
-    from quadriga.bridges.go2_driver import Go2Driver
+    from quadriga.bridges.drivers import Go2Driver
+    from quadriga.bridges.plant import bridge_of
 
     if config.team.robot != "go2":
         cause = "A1 and Go1: switch it off and on again"
@@ -79,8 +79,7 @@ def _restore(config: Config, name: str, controller: str) -> int:
 
 
 def _test_joints(config: Config, name: str) -> int:
-    from quadriga.bridges.bridge import build_joint_tester
-    from quadriga.bridges.joint_verdicts import refuse_wrong, table
+    from quadriga.bridges.joint_test import build_joint_tester, refuse_wrong, table
     from quadriga.shared.runtime.collector import end_collection
     from quadriga.shared.runtime.scheduling import take_priority
     from quadriga.shared.runtime.signals import stop_on_signals

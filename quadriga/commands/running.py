@@ -68,7 +68,7 @@ def at_its_place(team: RunningTeam, given: dict[str, Any]) -> dict[str, Any]:
 def registered(arguments: argparse.Namespace, config: Config) -> Iterator[None]:
     """Within the block others find the team of a member that was started by hand."""
     started_by_hand = arguments.command in _MEMBERS and not arguments.parent
-    if not started_by_hand or vars(arguments).get("native"):  # who speaks a robot's protocol
+    if not started_by_hand or vars(arguments).get("emulated"):  # who speaks a robot's protocol
         yield
         return
     from quadriga.team.registry import team_registered

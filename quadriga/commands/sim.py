@@ -20,25 +20,16 @@ def add(add_command: AddCommand) -> None:
     )
     command.add_argument(
         "--as",
-        dest="native",
+        dest="emulated",
         default="",
         choices=("a1", "go1", "go2"),
-        help="the simulated robots speak the protocol of this kind, for bridges, and lie at first",
+        help="the simulated robots speak the protocol of this kind, for bridges, and lie at first; "
+        "commands such as 'r1 loss 0.05' come through a pipe, see docs/robots.md",
     )
     command.add_argument(
         "--hung",
         action="store_true",
         help="with --as: the robots hang in the air, for a test of their joints",
-    )
-    command.add_argument(
-        "--do",
-        dest="orders",
-        action="append",
-        default=[],
-        metavar="ORDER",
-        help="with --as: what happens to a robot, such as 'r1 loss 0.05' or '4.0 r1 battery 8', "
-        "4 s after the start; may be repeated; so are lines on the standard input, which 'help' "
-        "explains",
     )
     command.add_argument(
         "--truth",
@@ -54,13 +45,9 @@ def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     from quadriga.shared.robot.conventions import robot_names
     from quadriga.team.plants import plant_factory
 
-    if arguments.native:
-        return _run_native(arguments, config)
-    for given, name in (
-        (arguments.hung, "--hung"),
-        (arguments.orders, "--do"),
-        (arguments.truth, "--truth"),
-    ):
+    if arguments.emulated:
+        return _emulate(arguments, config)
+    for given, name in ((arguments.hung, "--hung"), (arguments.truth, "--truth")):
         if given:
             raise ConfigError(name, "no --as", "--as with a kind of robot")
     robot, plants = arguments.robot, config.team.plants
@@ -72,13 +59,13 @@ def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     return 0
 
 
-def _run_native(arguments: argparse.Namespace, config: Config) -> int:
-    from quadriga.sim_server.native import process
+def _emulate(arguments: argparse.Namespace, config: Config) -> int:
+    from quadriga.sim_server.emulator import process
 
-    kind = arguments.native
+    kind = arguments.emulated
     if kind != config.team.robot:
         cause = "team.robot says what the team is made of"
         raise ConfigError("--as", repr(kind), repr(config.team.robot), cause)
     truth = Path(arguments.truth) if arguments.truth else None
-    process.run(config, process.NativeTask(arguments.hung, tuple(arguments.orders), truth))
+    process.run(config, hung=arguments.hung, truth=truth)
     return 0

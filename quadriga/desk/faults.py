@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 from typing import Final, NamedTuple
 
-PLANT, AGENT, GUARD, ROUTER = "plant", "agent", "guard", "router"
+PLANT, AGENT, WATCHDOG, ROUTER = "plant", "agent", "watchdog", "router"
 
 
 class Fault(NamedTuple):
@@ -14,8 +14,8 @@ class Fault(NamedTuple):
     Attributes:
         name: on the command line and in tables.
         what: in words.
-        orders: what the simulated robot's desk is told, without the robot's name.
-        processes: get `signal`: `PLANT`, `AGENT`, `GUARD` of the robot, or `ROUTER`.
+        orders: commands to the emulated robot, without its name.
+        processes: get `signal`: `PLANT`, `AGENT`, `WATCHDOG` of the robot, or `ROUTER`.
         signal: SIGKILL or SIGSTOP.
         robot: whose fault it is: "" is any of them.
     """
@@ -35,7 +35,9 @@ FAULTS: Final = (
     Fault("bus-cut", "the router is killed: nobody hears anybody", processes=(ROUTER,)),
     Fault("bridge-killed", "the bridge's process is killed", processes=(PLANT,), robot="r2"),
     Fault("bridge-frozen", "the bridge's process stands still", (), (PLANT,), _STOP, "r2"),
-    Fault("computer-lost", "bridge and guard are killed at once", (), (GUARD, PLANT), robot="r2"),
+    Fault(
+        "computer-lost", "bridge and watchdog are killed at once", (), (WATCHDOG, PLANT), robot="r2"
+    ),
     Fault("leader-killed", "the bridge that leads the clock is killed", (), (PLANT,), robot="r1"),
     Fault("leader-frozen", "it stands still", (), (PLANT,), _STOP, "r1"),
     Fault("loss-1", "1 % of the robot's packets are lost, both ways", ("loss 0.01",)),

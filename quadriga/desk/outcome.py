@@ -13,7 +13,7 @@ import numpy as np
 from quadriga.desk.robots import Said
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.messages import Truth
-from quadriga.sim_server.native.news import LOST
+from quadriga.sim_server.emulator.process import LOST
 
 FELL: Final = 0.8  # rad, tilt of a trunk: a robot that lies down or sinks stays flatter
 _SECOND: Final = 1000  # ms
@@ -47,7 +47,7 @@ def read_truth(path: Path, names: Sequence[str]) -> dict[str, TrunkTrace]:
     """The trunks of the robots with these names.
 
     Args:
-        path: written by `quadriga sim --as KIND --truth`: columns `ms` and `<robot>_<x …>`.
+        path: written by `quadriga sim --as KIND --truth`: columns `ms` and `<robot>_…`.
         names: of the robots.
     """
     with path.open(encoding="utf-8", newline="") as file:
@@ -58,11 +58,12 @@ def read_truth(path: Path, names: Sequence[str]) -> dict[str, TrunkTrace]:
         return np.stack([columns[f"{name}_{field}"] for field in fields], axis=-1)
 
     return {
-        name: TrunkTrace(
+        name: _trace(
             columns["ms"],
             stack(name, "x", "y", "z"),
-            stack(name, "roll", "pitch", "yaw"),
-            stack(name, "vx", "vy", "wz"),
+            stack(name, "qw", "qx", "qy", "qz"),
+            stack(name, "vx", "vy", "vz"),
+            columns[f"{name}_wz"],
         )
         for name in names
     }
@@ -70,19 +71,27 @@ def read_truth(path: Path, names: Sequence[str]) -> dict[str, TrunkTrace]:
 
 def traces_of(truths: Sequence[Truth]) -> list[TrunkTrace]:
     """The trunks of a recorded walk by its truth, robot by robot."""
-    positions, velocities = (
-        np.array([getattr(truth, name) for truth in truths]) for name in ("base_pos", "base_vel")
-    )
-    rates = np.array([truth.base_omega[:, 2] for truth in truths])
-    w, x, y, z = np.moveaxis(np.array([truth.base_quat_wxyz for truth in truths]), -1, 0)
-    roll = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
-    pitch = np.arcsin(np.clip(2 * (w * y - z * x), -1.0, 1.0))
-    yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-    cos, sin, (vx, vy) = np.cos(yaw), np.sin(yaw), np.moveaxis(velocities[..., :2], -1, 0)
-    angles = np.stack([roll, pitch, yaw], axis=-1)
-    forward = np.stack([cos * vx + sin * vy, cos * vy - sin * vx, rates], axis=-1)
     ms = np.array([float(truth.tick) for truth in truths])
-    return [TrunkTrace(ms, positions[:, k], angles[:, k], forward[:, k]) for k in range(w.shape[1])]
+    return [
+        _trace(
+            ms,
+            np.array([truth.base_pos[k] for truth in truths]),
+            np.array([truth.base_quat_wxyz[k] for truth in truths]),
+            np.array([truth.base_vel[k] for truth in truths]),
+            np.array([truth.base_omega[k, 2] for truth in truths]),
+        )
+        for k in range(len(truths[0].robots))
+    ]
+
+
+def _trace(ms: Array, xyz: Array, quat_wxyz: Array, velocity: Array, yaw_rate: Array) -> TrunkTrace:
+    w, x, y, z = quat_wxyz.T
+    roll = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+    pitch = np.arcsin(np.clip(2 * (w * y - x * z), -1.0, 1.0))
+    yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+    cos, sin, (vx, vy) = np.cos(yaw), np.sin(yaw), velocity[:, :2].T
+    forward = np.stack([cos * vx + sin * vy, cos * vy - sin * vx, yaw_rate], axis=-1)
+    return TrunkTrace(ms, xyz, np.stack([roll, pitch, yaw], axis=-1), forward)
 
 
 def time_to_rest(said: Sequence[Said], robot: str, since: int) -> int | None:

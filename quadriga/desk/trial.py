@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 from rich.console import Console
 
-from quadriga.desk.faults import AGENT, GUARD, NO_FAULT, PLANT, ROUTER, Fault
+from quadriga.desk.faults import AGENT, NO_FAULT, PLANT, ROUTER, WATCHDOG, Fault
 from quadriga.desk.outcome import (
     FELL,
     describe_walk,
@@ -206,7 +206,7 @@ class _Trial:
 
     def _pids(self, what: str) -> list[int]:
         pids = self._launch.pids
-        if what == GUARD:
+        if what == WATCHDOG:
             return children_of(pids[plant_name(self._patient)])
         return [pids[self._name_of(what)]]
 

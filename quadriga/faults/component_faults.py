@@ -11,8 +11,7 @@ from typing import Final
 from quadriga.faults.fault import Draw, SetStage, Stage, TeamFault
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.conventions import robot_names
-from quadriga.sim_server.world.faults.components import build_components
-from quadriga.sim_server.world.faults.fault import KINDS, parse_faults
+from quadriga.sim_server.world.faults import KINDS, build_components, parse_faults
 
 _SHORT_S: Final = 0.5  # of a component that is faulty for a while
 _COMPONENTS: Final = (  # as in `world.faults`, in words, and how long: None is from then on

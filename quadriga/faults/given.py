@@ -15,8 +15,7 @@ from quadriga.faults.link_faults import LINK_WORDS, LINKS
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError, did_you_mean
 from quadriga.shared.robot.conventions import robot_names
-from quadriga.sim_server.world.faults.components import build_components
-from quadriga.sim_server.world.faults.fault import KINDS
+from quadriga.sim_server.world.faults import KINDS, build_components
 
 GRAMMAR: Final = "NAME or [ROBOT/]PART KIND, with --at S [--for S]"
 PARTS: Final = ("agent", "link", "radio", "clock", "certificate", "message")  # of a robot

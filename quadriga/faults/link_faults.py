@@ -19,8 +19,8 @@ from quadriga.faults.network.emulated import EmulatedNetwork
 from quadriga.faults.network.layout import NetworkLayout
 from quadriga.faults.network.order import RadioOrder
 from quadriga.shared.config.sections import Config
-from quadriga.sim_server.native.link import LinkFaults
-from quadriga.sim_server.world.faults.fault import DELAYED, GARBAGE, INTERMITTENT, OFF, SLOW
+from quadriga.sim_server.emulator.link import LinkFaults
+from quadriga.sim_server.world.faults import DELAYED, GARBAGE, INTERMITTENT, OFF, SLOW
 
 _GONE: Final = LinkFaults(loss=1.0)
 _RTO_MIN_MS: Final = 20

@@ -11,7 +11,7 @@ import mujoco
 from quadriga.pictures.link_mesh import LinkMesh, LinkMeshes
 from quadriga.shared.robot.colours import robot_rgb
 from quadriga.shared.robot.conventions import FOOT_FRAMES, Leg
-from quadriga.sim_server.terrain.contact import NO_CONTACT
+from quadriga.sim_server.terrain.relief import NO_CONTACT
 from quadriga.sim_server.world.robot_body import TRUNK, VISUAL_GROUP
 
 HIDDEN_GROUP: Final = 3  # which MuJoCo draws only on demand

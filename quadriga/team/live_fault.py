@@ -15,8 +15,7 @@ from quadriga.shared.wire.codes import FAULT_ASKED, FAULT_REFUSED
 from quadriga.shared.wire.envelope import envelope
 from quadriga.shared.wire.messages import Event, LiveFault
 from quadriga.shared.wire.topics import CLOCK, EVENT, LIVE_FAULT
-from quadriga.sim_server.world.faults.components import build_components
-from quadriga.sim_server.world.faults.fault import parse_faults, with_time
+from quadriga.sim_server.world.faults import build_components, parse_faults, with_time
 
 _PATIENCE: Final = 5.0  # s, for the team to be there, and for the answer
 

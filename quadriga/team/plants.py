@@ -42,7 +42,7 @@ def plant_factory(config: Config) -> PlantFactory:
 
         return World
     if kind == BRIDGED:
-        from quadriga.bridges.bridge import build_bridge
+        from quadriga.bridges.plant import build_bridge
 
         return build_bridge
     found = entry_points(group=GROUP, name=kind)

@@ -18,9 +18,8 @@ from quadriga.shared.runtime.scheduling import valid_priority
 from quadriga.shared.runtime.signals import stop_flag
 from quadriga.shared.wire.codes import FAULT_ENDS
 from quadriga.shared.wire.messages import Event
-from quadriga.sim_server.world.faults.injection import Injection
-from quadriga.sim_server.world.payload import build_loads
-from quadriga.sim_server.world.scenario import build_scenario
+from quadriga.sim_server.world.faults import Injection
+from quadriga.sim_server.world.scenario import build_loads, build_scenario
 from quadriga.team.controller_program import check_controller
 from quadriga.team.drive_page import DrivePage
 from quadriga.team.endpoint import endpoint_claimed

@@ -110,14 +110,13 @@ def _check_motors(motors: MotorsConfig) -> None:
 
 
 def _check_foot_sensors(config: Config) -> None:
-    """A robot that is simulated says what its feet measure."""
-    if config.team.plant != SIMULATED or config.sensors.foot_sensor == "newtons":
-        return
-    if config.controller.foot_load == "sensor":
+    """Feet that give counts, as those of real robots do, are not taken for such that measure N."""
+    simulated = config.team.plant == SIMULATED and config.sensors.foot_sensor != "newtons"
+    if config.controller.foot_load == "sensor" and (simulated or config.team.plant == BRIDGED):
         raise ConfigError(
             "controller.foot_load",
-            f"'sensor' with sensors.foot_sensor = {config.sensors.foot_sensor!r}",
-            "'fused', or sensors.foot_sensor = 'newtons'",
+            "'sensor' with feet that give counts",
+            "'fused', or simulated robots with sensors.foot_sensor = 'newtons'",
             "counts of unknown scale and bias would be taken for N",
         )
 

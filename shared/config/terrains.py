@@ -32,15 +32,12 @@ class TerrainKind:
 
 _ROWS: Final = (
     TerrainKind("flat", "", "flat"),
-    TerrainKind("boxes", "blocks:build_blocks", "boxes up to {terrain_height:g} m"),
+    TerrainKind("boxes", "ground:build_blocks", "boxes up to {terrain_height:g} m"),
     TerrainKind(
-        "gravel",
-        "height_field:build_gravel",
-        "gravel up to {terrain_height:g} m",
-        meaning="fixed stones",
+        "gravel", "ground:build_gravel", "gravel up to {terrain_height:g} m", meaning="fixed stones"
     ),
     TerrainKind(
-        "heightfield", "height_field:build_smooth_field", "heightfield up to {terrain_height:g} m"
+        "heightfield", "ground:build_smooth_field", "heightfield up to {terrain_height:g} m"
     ),
     TerrainKind(
         "pebbles",
@@ -51,13 +48,13 @@ _ROWS: Final = (
     ),
     TerrainKind(
         "slope",
-        "height_field:build_ramps",
+        "ground:build_ramps",
         "slope of {slope:g} deg up to {terrain_height:g} m",
         meaning="ramps up and down",
     ),
     TerrainKind(
         "stairs",
-        "stairs:build_stairs",
+        "ground:build_stairs",
         "stairs, {stairs_count} steps of {stairs_rise:g} m up and down, {stairs_run:g} m deep",
         meaning="up, a landing, and down again",
         height_key="stairs_rise",

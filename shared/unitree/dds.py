@@ -12,11 +12,12 @@ import importlib.util
 import zlib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Final, Self
+from typing import Any, Final, NamedTuple, Self
 
 import numpy as np
 
 from quadriga.shared.errors import BridgeError, ConfigError
+from quadriga.shared.unitree.codecs import GO2
 
 # Operations of a topic's descriptor: how the library finds the fields of a struct.
 _ADDRESS: Final = 1 << 24
@@ -220,15 +221,6 @@ class DdsParticipant:
         )
         return self._check(made, f"DDS topic {name}")
 
-    def struct_topic(self, name: str, typename: str, layout: np.dtype[np.void]) -> int:
-        """Declare a topic whose samples are structs of numbers.
-
-        Raises:
-            BridgeError: it is there with another type.
-        """
-        ops = operations(layout)
-        return self.topic(name, typename, layout.itemsize, layout.alignment, ops)
-
     def reader(self, topic: int, *, of_others: bool = False) -> int:
         """A reader: best effort, keeps the last samples.
 
@@ -278,15 +270,42 @@ class DdsParticipant:
         return handle
 
 
+class StructTopic(NamedTuple):
+    """A topic whose samples are structs of numbers: its name, its type, its layout in C."""
+
+    name: str
+    typename: str
+    layout: np.dtype[np.void]
+
+
+LOW_COMMANDS: Final = StructTopic("rt/lowcmd", "unitree_go::msg::dds_::LowCmd_", GO2.command)
+LOW_STATES: Final = StructTopic("rt/lowstate", "unitree_go::msg::dds_::LowState_", GO2.report)
+
+
+def _declare(participant: DdsParticipant, topic: StructTopic) -> int:
+    layout = topic.layout
+    size, alignment, ops = layout.itemsize, layout.alignment, operations(layout)
+    return participant.topic(topic.name, topic.typename, size, alignment, ops)
+
+
 class StructReader:
-    """Takes samples that are structs of numbers; its arguments as those of `reader`."""
+    """Takes samples of a topic.
+
+    Args:
+        participant: of the domain.
+        topic: that it reads.
+        of_others: whether it reads nothing that this participant writes.
+
+    Raises:
+        BridgeError: the topic is there with another type.
+    """
 
     def __init__(
-        self, participant: DdsParticipant, topic: int, size: int, *, of_others: bool = False
+        self, participant: DdsParticipant, topic: StructTopic, *, of_others: bool = False
     ) -> None:
         self._library = participant.library
-        self.handle = participant.reader(topic, of_others=of_others)
-        self._sample = c.create_string_buffer(size)
+        self.handle = participant.reader(_declare(participant, topic), of_others=of_others)
+        self._sample = c.create_string_buffer(topic.layout.itemsize)
         self._samples = (c.c_void_p * 1)(c.addressof(self._sample))
         self._info = SampleInfo()
 
@@ -305,13 +324,14 @@ class StructReader:
 
 
 class StructWriter:
-    """Writes samples that are structs of numbers."""
+    """Writes samples of a topic; its arguments as those of `StructReader`."""
 
-    def __init__(self, participant: DdsParticipant, topic: int, size: int) -> None:
-        self._library, self.handle = participant.library, participant.writer(topic)
-        self._sample = c.create_string_buffer(size)
+    def __init__(self, participant: DdsParticipant, topic: StructTopic) -> None:
+        self._library = participant.library
+        self.handle = participant.writer(_declare(participant, topic))
+        self._sample = c.create_string_buffer(topic.layout.itemsize)
 
-    def write(self, sample: bytes) -> bool:
+    def send(self, sample: bytes) -> bool:
         """Write; whether the library took it."""
         self._sample.raw = sample
         return bool(self._library.dds_write(self.handle, c.addressof(self._sample)) >= 0)

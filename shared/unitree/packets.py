@@ -1,14 +1,16 @@
-"""One packet of a robot in this project's order, units and frames, and what a codec of it is."""
+"""What is in the packets of a robot, in this project's order, units and frames."""
 
 from __future__ import annotations
 
+import struct
 from dataclasses import dataclass, field
-from typing import Final, Protocol
+from functools import cache
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from quadriga.shared.errors import QuadrigaError
+from quadriga.shared.errors import ConfigError, QuadrigaError
 from quadriga.shared.robot.conventions import N_JOINTS, N_LEGS, Array
 
 SERVO: Final = 0x0A  # of A1 and Go1: the motor follows its command
@@ -16,7 +18,12 @@ ON: Final = 0x01  # the same of the Go2
 OFF: Final = 0x00  # the motor brakes, and gives no torque of its own
 PROTECTED: Final = 0x08  # the motor has switched itself off: too hot, or too much current
 REMOTE_BYTES: Final = 40
-_GREATEST: Final = float(np.finfo(np.float32).max)
+BUTTONS: Final = (  # of the remote control, by their bits
+    *("R1", "L1", "start", "select", "R2", "L2", "F1", "F2", "A", "B", "X", "Y"),
+    *("up", "right", "down", "left"),
+)
+_KEYS: Final = struct.Struct("<2sH")  # head and buttons; behind them are the sticks
+_REMOTE_HEAD: Final = b"\x55\x51"
 NO_ANGLE, NO_RATE = 2.146e9, 16000.0  # rad, rad/s: what Unitree writes where nothing is asked for
 
 # Where each of this project's joints and feet (FL FR RL RR) is in the robots' order (FR FL RR RL).
@@ -85,7 +92,7 @@ class RobotReport:
         temperature: of each motor, (12,), °C.
         lost: packets that each motor has missed, (12,); zeros of a robot that does not count them.
         imu_temperature: °C.
-        remote: of the remote control, 40 bytes, see `remote.read_remote`.
+        remote: of the remote control, 40 bytes, see `pressed_buttons`.
         battery: None of a robot that says nothing of it.
     """
 
@@ -105,76 +112,40 @@ class RobotReport:
     battery: Battery | None = None
 
 
-class PacketCodec(Protocol):
-    """Turns packets of one kind of robot into bytes and back; the robot's side and ours."""
-
-    def encode_command(self, targets: MotorTargets) -> bytes:
-        """The bytes that a robot obeys.
-
-        Torques and gains beyond what a packet holds are brought to its limits.
-
-        Raises:
-            PacketError: a number is not finite.
-        """
-        ...
-
-    def decode_command(self, packet: bytes) -> MotorTargets:
-        """What a command asks of the motors, with the resolution of the packet.
-
-        Raises:
-            PacketError: the bytes are no command, or damaged.
-        """
-        ...
-
-    def encode_report(self, report: RobotReport) -> bytes:
-        """The bytes that a robot sends."""
-        ...
-
-    def decode_report(self, packet: bytes) -> RobotReport:
-        """What a robot has sent. Numbers may be of any value, also none.
-
-        Raises:
-            PacketError: the bytes are no report, or damaged.
-        """
-        ...
+def pressed_buttons(remote: bytes) -> frozenset[str]:
+    """Names of the buttons that are down in the 40 bytes of a report, of `BUTTONS`."""
+    _, keys = _KEYS.unpack_from(remote)
+    return frozenset(name for bit, name in enumerate(BUTTONS) if keys >> bit & 1)
 
 
-def check_finite(targets: MotorTargets) -> None:
-    """Refuse a command with a number that is none.
+def are_pressed(remote: bytes, buttons: frozenset[str]) -> bool:
+    """Whether all these buttons are down in the 40 bytes of a report, and perhaps others."""
+    _, keys = _KEYS.unpack_from(remote)
+    wanted = _bits(buttons)
+    return bool(keys & wanted == wanted)
+
+
+def remote_bytes(buttons: frozenset[str] = frozenset()) -> bytes:
+    """The 40 bytes of a remote control that is on while these buttons are down, sticks at rest."""
+    return _KEYS.pack(_REMOTE_HEAD, _bits(buttons)).ljust(REMOTE_BYTES, b"\0")
+
+
+@cache
+def _bits(buttons: frozenset[str]) -> int:
+    return sum(1 << bit for bit, name in enumerate(BUTTONS) if name in buttons)
+
+
+def parse_buttons(text: str, name: str) -> frozenset[str]:
+    """Buttons that are pressed together, as `L2+B`.
+
+    Args:
+        text: their names with `+` between them.
+        name: of the key that has the text, for the error.
 
     Raises:
-        PacketError: it names the first such field.
+        ConfigError: there is no such button.
     """
-    t = targets
-    # This way round, no number is refused, too.
-    if (np.abs(np.concatenate((t.q, t.dq, t.tau, t.kp, t.kd))) <= _GREATEST).all():
-        return
-    for name in ("q", "dq", "tau", "kp", "kd"):
-        values = getattr(targets, name)
-        if not (np.abs(values) <= _GREATEST).all():
-            raise PacketError(f"motor command: {name}", f"{values}", "finite numbers of 32 bits")
-
-
-def check_size(packet: bytes, size: int, what: str) -> None:
-    """Refuse a packet of another length.
-
-    Raises:
-        PacketError: it is shorter or longer.
-    """
-    if len(packet) != size:
-        got = f"{len(packet)} bytes"
-        raise PacketError(f"{what}: size", got, f"{size}", "another robot or firmware?")
-
-
-def check_crc(got: int, computed: int, what: str, level: int) -> None:
-    """Refuse a packet with a check sum that is not its own.
-
-    Robots and other people's programs fill in the head and the level of a packet as they like: a
-    Go2 leaves the level 0. So these decide nothing.
-
-    Raises:
-        PacketError: they differ.
-    """
-    if got != computed:
-        cause = f"damaged on its way? its level is {level:#04x}"
-        raise PacketError(f"{what}: crc", f"{got:08x}", f"{computed:08x}", cause)
+    buttons = frozenset(part.strip() for part in text.split("+"))
+    if buttons.difference(BUTTONS):
+        raise ConfigError(name, repr(text), f"buttons of {', '.join(BUTTONS)}, joined by +")
+    return buttons

@@ -94,7 +94,7 @@ EVENTS: Final[Mapping[str, EventCode]] = MappingProxyType(
         BRIDGE_MODE: EventCode(
             "bridge", "a bridge's robot begins to stand up, walk or lie down, or is hot"
         ),
-        ROBOT_STOPPED: EventCode("fault", "a bridge has stopped its robot: damped, then limp"),
+        ROBOT_STOPPED: EventCode("fault", "a bridge has stopped its robot: damped, then passive"),
         CLOCK: EventCode("fault", "how well a plant knows the team's clock crosses 1 ms"),
         TIME_OVER: EventCode("stop", "the walk is over: world.seconds have passed"),
         FALLEN: EventCode("stop", "the walk is over: a robot fell"),

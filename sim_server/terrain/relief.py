@@ -1,15 +1,67 @@
-"""What lies on the plane of a world: the one interface of all terrains."""
+"""What lies on the plane of a world: the one interface of all terrains, and where it is laid."""
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from typing import Any, ClassVar, Final, NamedTuple, Protocol
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
+from quadriga.shared.config.reference_trace import trace_of
+from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.conventions import Array
 
+# Two geoms touch if one's `contype` has a bit of the other's `conaffinity`. The ground has bit 1,
+# to which robots answer; loose stones touch ground, robots and each other by a second bit of their
+# own; legs and trunks touch each other by the third. MuJoCo leaves out a body's contact with the
+# one that it hangs on.
+TERRAIN_CONTACT: Final = {"contype": 1, "conaffinity": 0}
+ROBOT_CONTACT: Final = {"contype": 0, "conaffinity": 1}  # with the ground alone
+LEG_CONTACT: Final = {"contype": 4, "conaffinity": 5}  # with the ground and with other legs
+NO_CONTACT: Final = {"contype": 0, "conaffinity": 0}
+STONE_CONTACT: Final = {"contype": 3, "conaffinity": 2}
+GROUND_OF_STONES: Final = {"contype": 3, "conaffinity": 0}
+PLANE, EARTH = "plane", "earth"  # materials
+_Colour = tuple[float, float, float]
+_COLOURS: Final[dict[str, tuple[_Colour, _Colour, float]]] = {  # light, dark, edge of a square, m
+    PLANE: ((0.80, 0.82, 0.80), (0.70, 0.73, 0.71), 0.5),
+    EARTH: ((0.60, 0.54, 0.42), (0.53, 0.47, 0.36), 0.2),
+}
 FOLLOW_MS: Final = 4  # ms between two calls of `MovingBodies.follow`
+_HALF_BODY: Final = (0.25, 0.2)  # m, trunk origin to the farthest foot, along x and y
+_FLAT_MARGIN: Final = 0.4  # m, flat ground around the feet of the spawned team …
+_FLAT_AHEAD: Final = 0.5  # … and ahead of it
+_AHEAD: Final = 3.0  # m of terrain beyond the end of the way
+_BESIDE: Final = 1.0  # m of terrain beside the team, for a team that drifts
+_RAMP: Final = 0.5  # m over which a height field rises from the flat ground
+_LONGEST_WAY: Final = 40.0  # m; beyond it the ground is flat
+_STEP: Final = 0.05  # s, of the nominal way
+
+
+def add_checker(spec: mujoco.MjSpec, name: str) -> None:
+    """Add one of these materials, made of squares, to a world under construction."""
+    light, dark, square = _COLOURS[name]
+    spec.add_texture(
+        name=name,
+        type=mujoco.mjtTexture.mjTEXTURE_2D,
+        width=256,
+        height=256,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
+        rgb1=light,
+        rgb2=dark,
+    )
+    repeat = 0.5 / square  # the texture is two squares wide
+    spec.add_material(
+        name=name,
+        texrepeat=[repeat, repeat],
+        texuniform=True,
+        textures=["", name],
+        specular=0.1,
+        shininess=0.1,
+    )
 
 
 class MovingBodies(Protocol):
@@ -93,3 +145,120 @@ class Relief:
             reach: how far from there, m.
         """
         return Stones(np.zeros((0, 7)), np.zeros((0, 3)), np.zeros((0, 3)))
+
+
+@dataclass(frozen=True, slots=True)
+class Rectangle:
+    """An axis-aligned rectangle of the ground, m, world frame."""
+
+    x_low: float
+    x_high: float
+    y_low: float
+    y_high: float
+
+    @property
+    def sides(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Its limits along x and along y, m."""
+        return (self.x_low, self.x_high), (self.y_low, self.y_high)
+
+    def depth(self, x: Array, y: Array) -> Array:
+        """Distance to the border, positive inside and negative outside, m."""
+        dx = np.minimum(x - self.x_low, self.x_high - x)
+        dy = np.minimum(y - self.y_low, self.y_high - y)
+        outside = np.hypot(np.minimum(dx, 0.0), np.minimum(dy, 0.0))
+        return np.where(outside > 0.0, -outside, np.minimum(dx, dy))
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """The flat place under the spawned team and the rectangle that terrain fills around it."""
+
+    flat: Rectangle
+    extent: Rectangle
+    way: Array  # nominal positions of the formation's centre, shape (m, 2), m
+    reach: float  # m, how far from the way the team needs terrain
+
+    def rise(self, x: Array, y: Array) -> Array:
+        """Factor in [0, 1] by which a height field rises smoothly from its borders."""
+        into = np.minimum(-self.flat.depth(x, y), self.extent.depth(x, y))
+        return _smooth(into / _RAMP)
+
+    def edge(self, x: Array, y: Array) -> Array:
+        """Factor in [0, 1] that lowers the ground towards its outer borders alone."""
+        return _smooth(self.extent.depth(x, y) / _RAMP)
+
+    def needs(self, x: Array, y: Array) -> NDArray[np.bool_]:
+        """Whether points lie within `reach` of the way."""
+        square = np.full(np.shape(x), np.inf)
+        for px, py in self.way.tolist():
+            square = np.minimum(square, (x - px) ** 2 + (y - py) ** 2)
+        return square <= self.reach**2
+
+
+def _smooth(s: Array) -> Array:
+    """A smooth step: 0 to 1 as s goes from 0 to 1."""
+    s = np.clip(s, 0.0, 1.0)
+    return s * s * (3.0 - 2.0 * s)
+
+
+def build_course(config: Config, places: Array) -> Course:
+    """The course of a configuration: its reference integrated over the walk, with some margin.
+
+    Args:
+        config: the configuration; `reference` determines the way, `world.seconds` its length.
+        places: spawn positions of the trunks, shape (n, 2), m.
+    """
+    low, high = places.min(axis=0) - _HALF_BODY, places.max(axis=0) + _HALF_BODY
+    travelled = _way(config)
+    backward = _begins_backward(config, travelled)
+    flat = Rectangle(
+        x_low=low[0] - (_FLAT_AHEAD if backward else _FLAT_MARGIN),
+        x_high=high[0] + (_FLAT_MARGIN if backward else _FLAT_AHEAD),
+        y_low=low[1] - _FLAT_MARGIN,
+        y_high=high[1] + _FLAT_MARGIN,
+    )
+    way = (low + high) / 2.0 + travelled
+    # A team that turns sweeps a circle; one that walks straight, the width of its formation.
+    turning = config.reference.wz != 0.0 or bool(config.reference.trace)
+    half = (high - low) / 2.0
+    half = np.full(2, np.hypot(*half)) if turning else half
+    half = half + _BESIDE
+    start, end = way.min(axis=0) - half, way.max(axis=0) + half
+    extent = Rectangle(
+        x_low=float(start[0]), x_high=float(end[0]), y_low=float(start[1]), y_high=float(end[1])
+    )
+    return Course(flat=flat, extent=extent, way=way, reach=float(np.hypot(*half)))
+
+
+def _begins_backward(config: Config, way: Array) -> bool:
+    """Whether the team leaves the flat place backward; a trace counts for its first metre."""
+    if not config.reference.trace:
+        return config.reference.vx < 0.0
+    # The time at which the team reaches the end of the flat place.
+    left = np.linalg.norm(way, axis=1) >= _FLAT_AHEAD
+    return bool(way[left.argmax() if left.any() else -1, 0] < 0.0)
+
+
+def _way(config: Config) -> Array:
+    """Nominal way of the formation's centre from the origin. Shape (m, 2), m."""
+    ref, trace = config.reference, trace_of(config)
+    if trace is None:
+        longest = _LONGEST_WAY / max(math.hypot(ref.vx, ref.vy), 0.1)
+        times = np.arange(0.0, min(config.world.seconds, longest), _STEP)
+        vx, vy, yaw = ref.vx, ref.vy, ref.wz * times
+    else:
+        times = np.arange(0.0, config.world.seconds, _STEP)
+        vx, vy, wz = np.array([trace.at(t) for t in times.tolist()]).T
+        yaw = np.cumsum(_STEP * wz)
+    step = _STEP * np.stack(
+        [vx * np.cos(yaw) - vy * np.sin(yaw), vx * np.sin(yaw) + vy * np.cos(yaw)], axis=1
+    )
+    if trace is not None:
+        length = np.cumsum(np.linalg.norm(step, axis=1))
+        step = step[: max(1, int(np.searchsorted(length, _LONGEST_WAY)))]
+    speed = float(np.linalg.norm(step[-1]))
+    heading = step[-1] / speed if speed > 0.0 else np.array([1.0, 0.0])
+    ahead = np.arange(0.0, _AHEAD, 0.2)[:, None] * heading
+    walked = np.cumsum(step, axis=0)
+    way: Array = np.concatenate([np.zeros((1, 2)), walked, walked[-1] + ahead])
+    return way

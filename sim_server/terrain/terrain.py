@@ -14,10 +14,15 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.config.terrains import TERRAINS
 from quadriga.shared.config.world import WorldConfig
 from quadriga.shared.robot.conventions import Array
-from quadriga.sim_server.terrain.contact import GROUND_OF_STONES, TERRAIN_CONTACT
-from quadriga.sim_server.terrain.course import Course, build_course
-from quadriga.sim_server.terrain.materials import PLANE, add_checker
-from quadriga.sim_server.terrain.relief import Relief
+from quadriga.sim_server.terrain.relief import (
+    GROUND_OF_STONES,
+    PLANE,
+    TERRAIN_CONTACT,
+    Course,
+    Relief,
+    add_checker,
+    build_course,
+)
 
 _STREAM: Final = 1  # of the seed: the sensors draw from another one
 _Builder = Callable[[Course, WorldConfig, np.random.Generator], Relief]

@@ -14,11 +14,11 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.config.yokes import yoke_pairs
 from quadriga.shared.robot.colours import robot_rgb
 from quadriga.shared.robot.conventions import FOOT_FRAMES, GRAVITY, Array, robot_names
-from quadriga.sim_server.terrain.contact import NO_CONTACT
+from quadriga.sim_server.terrain.relief import NO_CONTACT
 from quadriga.sim_server.terrain.terrain import Terrain, build_terrain
 from quadriga.sim_server.world.layout import JOINT_POSITIONS, NQ
-from quadriga.sim_server.world.payload import Load, build_loads
 from quadriga.sim_server.world.robot_body import VISUAL_GROUP, RobotBody
+from quadriga.sim_server.world.scenario import Load, build_loads
 
 TIMESTEP: Final = 1e-3  # s, one tick
 

@@ -19,8 +19,7 @@ from quadriga.shared.wire.codes import FALL, FAULT_ASKED, LIES, UNSTABLE
 from quadriga.shared.wire.messages import Command, Event, State, Truth
 from quadriga.sim_server.terrain.relief import FOLLOW_MS
 from quadriga.sim_server.world import layout
-from quadriga.sim_server.world.faults.fault import with_time
-from quadriga.sim_server.world.faults.injection import Injection
+from quadriga.sim_server.world.faults import Injection, with_time
 from quadriga.sim_server.world.motors import Motors
 from quadriga.sim_server.world.scenario import build_scenario
 from quadriga.sim_server.world.sensors import Sensors

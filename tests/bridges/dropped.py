@@ -1,4 +1,4 @@
-"""A robot that is dropped limp, and stands up from where it lies, in MuJoCo without a network.
+"""A robot that is dropped passive, and stands up from where it lies, in MuJoCo without a network.
 
 `python -m tests.bridges.dropped` drops each kind of robot from random joint angles and prints how
 many stood up and lay down again.
@@ -15,13 +15,12 @@ from typing import Final, NamedTuple
 import mujoco
 import numpy as np
 
-from quadriga.bridges.modes import BridgeMode, Wish
-from quadriga.bridges.supervisor import Supervisor, SupervisorInputs, tilt_of
+from quadriga.bridges.supervisor import BridgeMode, Request, Supervisor, SupervisorInputs, tilt_of
 from quadriga.shared.config.load import load
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.robot.robots import ROBOTS
 from quadriga.shared.unitree.packets import SERVO
-from quadriga.sim_server.native.condition import RobotCondition
+from quadriga.sim_server.emulator.board import RobotStatus
 from quadriga.sim_server.world.world import World
 from tests.bridges.robots import holding
 
@@ -45,12 +44,12 @@ class Robot:
         self.world = World(self.config)
         self._supervisor = Supervisor(self.config.robot, self.config.bridge, SERVO)
         self.state = self._supervisor.initial(0, armed=True)
-        self._condition = RobotCondition((0,))
+        self._status = RobotStatus()
         self._on = holding(self.config)
         self.torque = 0.0
 
     def drop(self, q: Array) -> None:
-        """Let it fall, limp, from joint angles at which it touches nothing, and come to rest."""
+        """Let it fall, passive, from joint angles at which it touches nothing, and come to rest."""
         physics, model = self.world.physics, self.world.team.model
         physics.qpos[2], physics.qpos[7:] = 0.5, q
         physics.qvel[:] = 0.0
@@ -61,17 +60,17 @@ class Robot:
         for _ in range(800):
             self.world.step({})
 
-    def do(self, wish: Wish, end: BridgeMode) -> Iterator[Moment]:
+    def do(self, request: Request, end: BridgeMode) -> Iterator[Moment]:
         """Tick by tick, until the bridge is in the mode `end`, or has stopped."""
         for _ in range(15_000):
             tick = self.world.tick
             state, heat = self.world.states()["r1"], self.world.motors.heat[0]
-            report = self._condition.report(state, heat, self._on)
-            inputs = SupervisorInputs(now=tick, report=report, report_age=0, wish=wish)
+            report = self._status.report(state, heat, self._on)
+            inputs = SupervisorInputs(now=tick, report=report, report_age=0, request=request)
             self.state, supervised = self._supervisor.step(self.state, inputs)
             if self.state.mode in (end, BridgeMode.STOPPED):
                 return
-            command = self._condition.command(supervised.targets)
+            command = self._status.command(supervised.targets)
             self.world.step({} if command is None else {"r1": command})
             share = np.abs(self.world.motors.torque[0]) / self.config.robot.torque_limit
             self.torque = max(self.torque, float(share.max()))
@@ -82,7 +81,7 @@ class Robot:
             )
 
     def stand(self) -> list[Moment]:
-        return list(self.do(Wish.STAND, BridgeMode.STANDING))
+        return list(self.do(Request.STAND, BridgeMode.STANDING))
 
 
 def random_angles(kind: str, seed: int) -> Array:
@@ -103,12 +102,12 @@ def try_once(kind: str, seed: int) -> str:
     robot.drop(random_angles(kind, seed))
     if tilt_of(robot.world.physics.qpos[3:7]) > _LYING:
         return TILTED
-    for wish, end in ((Wish.STAND, BridgeMode.STANDING), (Wish.LIE, BridgeMode.LIMP)):
-        moments = list(robot.do(wish, end))
+    for request, end in ((Request.STAND, BridgeMode.STANDING), (Request.LIE, BridgeMode.PASSIVE)):
+        moments = list(robot.do(request, end))
         if robot.state.mode is not end:
             return f"{moments[-1].mode} {robot.state.reason.partition(':')[0]}"
         height = robot.config.robot.stand_height
-        if wish is Wish.STAND and abs(moments[-1].height / height - 1.0) > 0.1:
+        if request is Request.STAND and abs(moments[-1].height / height - 1.0) > 0.1:
             return "stood too low"
     return STOOD
 

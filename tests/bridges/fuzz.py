@@ -16,28 +16,31 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from quadriga.bridges.drivers import UdpDriver
 from quadriga.bridges.limits import joint_limits, shares_of_speed
-from quadriga.bridges.modes import BridgeMode, Wish
-from quadriga.bridges.robot_plant import to_state
-from quadriga.bridges.supervisor import Supervisor, SupervisorInputs, SupervisorState
-from quadriga.bridges.udp_driver import UdpDriver
+from quadriga.bridges.plant import to_state
+from quadriga.bridges.supervisor import (
+    BridgeMode,
+    Request,
+    Supervisor,
+    SupervisorInputs,
+    SupervisorState,
+)
 from quadriga.plant.command_limits import MOST_KD, MOST_KP
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
 from quadriga.shared.runtime.clock import monotonic
-from quadriga.shared.unitree import udp
-from quadriga.shared.unitree.crc import crc32
-from quadriga.shared.unitree.go2 import GO2
-from quadriga.shared.unitree.packets import PacketCodec, PacketError, RobotReport
-from quadriga.shared.unitree.udp_port import Address, UdpPort
+from quadriga.shared.unitree.codecs import CODECS, GO2, Codec, seal
+from quadriga.shared.unitree.packets import PacketError, RobotReport
+from quadriga.shared.unitree.udp import Address, UdpPort
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.messages import Command
 from tests.bridges.robots import config_of, standing
 from tests.bridges.test_udp_driver import HOST, free_port
 
 KINDS: Final = ("a1", "go1", "go2")
-_BEGINNINGS: Final = (BridgeMode.LIMP, BridgeMode.STANDING, BridgeMode.WALKING)
-_WISHES: Final = (*Wish, *20 * (Wish.WALK,))
+_BEGINNINGS: Final = (BridgeMode.PASSIVE, BridgeMode.STANDING, BridgeMode.WALKING)
+_REQUESTS: Final = (*Request, *20 * (Request.WALK,))
 _ANEW: Final = 0.3  # share of steps of a stopped robot after which it is in some other state
 _EXTREMES: Final = np.array(
     [np.nan, np.inf, -np.inf, 3e38, -3e38, 1e30, 1e5, -1e3, 1e-40, 0.0], np.float32
@@ -55,7 +58,7 @@ class Link(NamedTuple):
         arrived: commands that reached the robot, as bytes.
     """
 
-    codec: PacketCodec
+    codec: Codec
     send: Callable[[bytes], None]
     receive: Callable[[], RobotReport | None]
     command: Callable[..., None]
@@ -74,7 +77,7 @@ def link_to(kind: str, config: Config) -> Iterator[Link]:
     driver = UdpDriver(kind, config_of(kind, **ends).bridge)
     try:
         yield Link(
-            udp.CODECS[kind],
+            CODECS[kind],
             lambda packet: _sent(robot.send(packet, bridge)),
             driver.receive,
             driver.send,
@@ -150,12 +153,6 @@ class Damage:
         return seal(packet.tobytes())
 
 
-def seal(packet: bytes) -> bytes:
-    """The packet with the check sum that belongs to it."""
-    covered = (len(packet) // 4 - 1) * 4
-    return packet[:-4] + crc32(packet[:covered]).to_bytes(4, "little")
-
-
 class Fuzz:
     """One robot and its bridge.
 
@@ -169,7 +166,7 @@ class Fuzz:
         self._supervisor = Supervisor(config.robot, config.bridge, servo=10)
         self._limits = joint_limits(config.bridge, config.robot)
         report = self._good = standing(config)
-        layout = None if kind == "go2" else udp.CODECS[kind].report
+        layout = None if kind == "go2" else CODECS[kind].report
         counter = None if layout is None or layout.fields is None else layout.fields["tick"][1]
         self._damage = Damage(link.codec.encode_report(report), seed, counter)
         good = np.stack([np.zeros(12), config.robot.q_stand, *np.ones((3, 12))])
@@ -180,11 +177,13 @@ class Fuzz:
         self.counts: Counter[str] = Counter()
 
     def _begin(self, now: int) -> SupervisorState:
-        """A state that a bridge may be in, and what follows it by some wish."""
-        limp = self._supervisor.initial(now, armed=True)
-        state = replace(limp, mode=_BEGINNINGS[self._random.integers(len(_BEGINNINGS))])
-        wish = list(Wish)[self._random.integers(len(Wish))]
-        return self._supervisor.step(state, SupervisorInputs(now, self._good, 0, wish=wish))[0]
+        """A state that a bridge may be in, and what follows it by some request."""
+        passive = self._supervisor.initial(now, armed=True)
+        state = replace(passive, mode=_BEGINNINGS[self._random.integers(len(_BEGINNINGS))])
+        request = list(Request)[self._random.integers(len(Request))]
+        return self._supervisor.step(state, SupervisorInputs(now, self._good, 0, request=request))[
+            0
+        ]
 
     def run(self, packets: int) -> None:
         """Send packets.
@@ -214,7 +213,7 @@ class Fuzz:
             report_age=self._age,
             command=self._command,
             command_age=int(self._random.integers(0, 60)),
-            wish=_WISHES[self._random.integers(len(_WISHES))],
+            request=_REQUESTS[self._random.integers(len(_REQUESTS))],
         )
         self._state, supervised = self._supervisor.step(self._state, inputs)
         self.counts[str(self._state.mode)] += 1

@@ -13,8 +13,7 @@ import numpy as np
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robot.conventions import GRAVITY, Array
-from quadriga.shared.unitree.packets import SERVO, Battery, MotorTargets, RobotReport
-from quadriga.shared.unitree.remote import RemoteReading, write_remote
+from quadriga.shared.unitree.packets import SERVO, Battery, MotorTargets, RobotReport, remote_bytes
 
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
 
@@ -55,7 +54,7 @@ def tilted(angle: float) -> Any:
 
 def pressing(*buttons: str) -> bytes:
     """What the remote control sends while these buttons are down."""
-    return write_remote(RemoteReading(True, frozenset(buttons)))
+    return remote_bytes(frozenset(buttons))
 
 
 def holding(config: Config, **fields: Any) -> MotorTargets:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from quadriga.bridges.modes import BridgeMode
+from quadriga.bridges.supervisor import BridgeMode
 from tests.bridges.fuzz import KINDS, fuzz
 
 

@@ -7,117 +7,117 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from quadriga.bridges.go2_driver import Go2Driver
-from quadriga.bridges.robot_loop import RobotLoop
+from quadriga.bridges.drivers import Go2Driver
+from quadriga.bridges.plant import RobotPlant
 from quadriga.shared.config.bridge import BridgeConfig
 from quadriga.shared.errors import BridgeError, ConfigError
 from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.unitree import rpc
 from quadriga.shared.unitree.packets import ON
 from tests.bridges.robots import config_of, holding
-from tests.sim_server.native.test_go2_robot import Desk, hasten, wait_until
+from tests.sim_server.emulator.test_go2_board import Bench, hasten, wait_until
 
 
 @pytest.fixture
-def desk(monkeypatch: pytest.MonkeyPatch) -> Iterator[Desk]:
+def bench(monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
     hasten(monkeypatch)
-    made = Desk(192)  # a domain of no other test
+    made = Bench(192)  # a domain of no other test
     yield made
     made.close()
     assert made.robot.malformed == 0
 
 
-def executed(desk: Desk) -> list[int]:
+def executed(bench: Bench) -> list[int]:
     """What the robot has done of what it was asked for, but for questions."""
     queries = (rpc.API_VERSION, rpc.CHECK_MODE)
-    return [api for api in desk.robot.executed if api not in queries]
+    return [api for api in bench.robot.executed if api not in queries]
 
 
-def test_before_it_takes_over_nothing_is_written(desk: Desk) -> None:
-    wait_until(lambda: desk.driver.receive() is not None)
-    desk.driver.send(holding(config_of("go2"), mode=np.full(12, ON, np.uint8)))
-    assert desk.driver.counters["unsent"] == 1
+def test_before_it_takes_over_nothing_is_written(bench: Bench) -> None:
+    wait_until(lambda: bench.driver.receive() is not None)
+    bench.driver.send(holding(config_of("go2"), mode=np.full(12, ON, np.uint8)))
+    assert bench.driver.counters["unsent"] == 1
     sleep(0.05)
-    assert desk.robot.received == 0
-    assert desk.robot.controller == "normal"
+    assert bench.robot.received == 0
+    assert bench.robot.controller == "normal"
 
 
 def test_the_robots_own_controller_lies_down_once_lets_go_and_commands_arrive(
-    desk: Desk, monkeypatch: pytest.MonkeyPatch
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It writes commands until it has let go, and stays an idle writer of them."""
-    monkeypatch.setattr("quadriga.sim_server.native.go2_robot._MOTION_MS", 700)
-    desk.driver.take_over()
-    assert (desk.robot.controller, desk.driver.released) == ("", "normal")
-    assert executed(desk) == [rpc.STAND_DOWN, rpc.RELEASE_MODE]
-    assert not desk.robot._motions, "it was asked once"
+    monkeypatch.setattr("quadriga.sim_server.emulator.board._MOTION_MS", 700)
+    bench.driver.take_over()
+    assert (bench.robot.controller, bench.driver.released) == ("", "normal")
+    assert executed(bench) == [rpc.STAND_DOWN, rpc.RELEASE_MODE]
+    assert not bench.robot._motions, "it was asked once"
     targets = holding(config_of("go2"), mode=np.full(12, ON, np.uint8), tau=np.arange(12.0))
 
     def arrived() -> bool:
-        desk.driver.send(targets)
-        return desk.command is not None
+        bench.driver.send(targets)
+        return bench.command is not None
 
     wait_until(arrived)
-    assert desk.command is not None
-    np.testing.assert_allclose(desk.command.tau, np.arange(12.0))
-    assert desk.driver.other_writers() == 0
-    desk.driver.give_back(desk.driver.released)
-    assert desk.robot.controller == "normal"
-    wait_until(lambda: desk.command is None)
+    assert bench.command is not None
+    np.testing.assert_allclose(bench.command.tau, np.arange(12.0))
+    assert bench.driver.other_writers() == 0
+    bench.driver.give_back(bench.driver.released)
+    assert bench.robot.controller == "normal"
+    wait_until(lambda: bench.command is None)
 
 
 def test_a_controller_that_the_robot_does_not_have_is_named(
-    desk: Desk, monkeypatch: pytest.MonkeyPatch
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("quadriga.bridges.go2_driver._LETTING_GO", 0.5)
+    monkeypatch.setattr("quadriga.bridges.drivers._LETTING_GO", 0.5)
     expected = r"own controller: got 'normal', expected 'dance', which it is asked for"
     with pytest.raises(BridgeError, match=expected):
-        desk.driver.give_back("dance")
-    calls = desk.robot.executed
+        bench.driver.give_back("dance")
+    calls = bench.robot.executed
     assert calls[0] == rpc.API_VERSION, "it may not have found the bridge yet: a query shows it"
     assert calls.count(rpc.SELECT_MODE) == 1
 
 
-def test_a_second_writer_is_refused_before_the_robots_own_controller_lets_go(desk: Desk) -> None:
-    desk.do(lambda: desk.robot.intrude(there=True))
-    wait_until(lambda: desk.driver.other_writers() == 2)
+def test_a_second_writer_is_refused_before_the_robots_own_controller_lets_go(bench: Bench) -> None:
+    bench.do(bench.robot.add_second_writer)
+    wait_until(lambda: bench.driver.other_writers() == 2)
     expected = "rt/lowcmd: got 2 others who write it, expected its own controller 'normal' alone"
     with pytest.raises(BridgeError, match=expected):
-        desk.driver.take_over()
-    assert (desk.robot.controller, desk.driver.released, executed(desk)) == ("normal", "", [])
+        bench.driver.take_over()
+    assert (bench.robot.controller, bench.driver.released, executed(bench)) == ("normal", "", [])
 
 
 def test_of_a_takeover_that_fails_later_the_operator_learns_whom_to_give_the_motors_back_to(
-    desk: Desk, monkeypatch: pytest.MonkeyPatch
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    await_mode = desk.driver._await_mode
+    await_mode = bench.driver._await_mode
 
     def intrude(controller: str) -> None:
         await_mode(controller)
-        desk.do(lambda: desk.robot.intrude(there=True))
+        bench.do(bench.robot.add_second_writer)
 
-    monkeypatch.setattr(desk.driver, "_await_mode", intrude)
+    monkeypatch.setattr(bench.driver, "_await_mode", intrude)
     said = list[str]()
-    loop = RobotLoop(config_of("go2"), "r1", desk.driver, guard=None, say=said.append)
+    plant = RobotPlant(config_of("go2"), "r1", bench.driver, watchdog=None, say=said.append)
     with pytest.raises(BridgeError, match="rt/lowcmd: got 1 others who write it, expected nobody"):
-        loop.take_charge()
+        plant.take_charge()
     assert ["--restore normal" in line for line in said] == [True]
 
 
 @pytest.mark.parametrize("lies_down", [False, True])
 def test_a_controller_that_does_not_lie_down_or_let_go_is_named(
-    desk: Desk, monkeypatch: pytest.MonkeyPatch, lies_down: bool
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, lies_down: bool
 ) -> None:
-    wait_until(lambda: desk.driver.receive() is not None)
-    monkeypatch.setattr("quadriga.bridges.go2_driver._LETTING_GO", 0.5)
+    wait_until(lambda: bench.driver.receive() is not None)
+    monkeypatch.setattr("quadriga.bridges.drivers._LETTING_GO", 0.5)
     if not lies_down:
-        monkeypatch.setattr("quadriga.sim_server.native.go2_robot._MOTION_MS", 60_000)
-    desk.robot.lets_go = False
+        monkeypatch.setattr("quadriga.sim_server.emulator.board._MOTION_MS", 60_000)
+    bench.robot.lets_go = False
     expected = "controller: got 'normal', expected to let" if lies_down else "sport: got no answer"
     with pytest.raises(BridgeError, match=expected):
-        desk.driver.take_over()
-    assert executed(desk) == ([rpc.STAND_DOWN, rpc.RELEASE_MODE] if lies_down else [])
-    assert desk.driver.released == ("normal" if lies_down else "")
+        bench.driver.take_over()
+    assert executed(bench) == ([rpc.STAND_DOWN, rpc.RELEASE_MODE] if lies_down else [])
+    assert bench.driver.released == ("normal" if lies_down else "")
 
 
 def test_without_an_interface_there_is_one_clear_error() -> None:

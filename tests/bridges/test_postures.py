@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quadriga.bridges.limits import joint_limits
-from quadriga.bridges.postures import lie_down, stand_up
-from quadriga.shared.robot.motions import posture_at
+from quadriga.shared.robot.motions import posture_at, way_down, way_up
 from quadriga.shared.robot.robots import ROBOTS
 from tests.bridges.robots import config_of
 
@@ -21,7 +20,8 @@ def test_from_any_posture_to_the_stand_and_down(kind: str, share: float, at: flo
     lower, upper = np.array(config.robot.lower), np.array(config.robot.upper)
     q = lower + share * (upper - lower)
     limits = joint_limits(config.bridge, config.robot)
-    up, down = stand_up(q, config.robot, config.bridge), lie_down(q, config.robot, config.bridge)
+    seconds = config.bridge.stand_s
+    up, down = way_up(q, config.robot, seconds), way_down(q, config.robot, seconds)
     for motion, end in ((up, config.robot.q_stand), (down, config.robot.q_lying)):
         first, still = posture_at(motion, 0.0)
         np.testing.assert_allclose(first, q)
@@ -37,7 +37,7 @@ def test_from_any_posture_to_the_stand_and_down(kind: str, share: float, at: flo
 
 def test_the_rate_is_that_of_the_angle() -> None:
     config = config_of()
-    motion = stand_up(config.robot.q_lying, config.robot, config.bridge)
+    motion = way_up(config.robot.q_lying, config.robot, config.bridge.stand_s)
     for seconds in np.linspace(0.01, motion.seconds - 0.01, 40):
         before, after = (posture_at(motion, seconds + d)[0] for d in (-1e-5, 1e-5))
         np.testing.assert_allclose(

@@ -1,4 +1,4 @@
-"""The ten states of a bridge, and every reason to stop."""
+"""The nine states of a bridge, and every reason to stop."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quadriga.bridges.modes import BridgeMode, Wish
 from quadriga.bridges.supervisor import (
+    BridgeMode,
+    Request,
     Supervised,
     Supervisor,
     SupervisorInputs,
@@ -46,21 +47,21 @@ def step(state: SupervisorState, inputs: SupervisorInputs) -> tuple[SupervisorSt
     return SUPERVISOR.step(state, inputs)
 
 
-@given(st.sampled_from(list(Wish)), st.integers(0, 10**6))
-def test_a_dry_run_never_sends(wish: Wish, now: int) -> None:
+@given(st.sampled_from(list(Request)), st.integers(0, 10**6))
+def test_a_dry_run_never_sends(request: Request, now: int) -> None:
     state = SUPERVISOR.initial(0, armed=False)
-    after, supervised = step(state, at(now, wish=wish))
+    after, supervised = step(state, at(now, request=request))
     assert supervised.targets is None
     assert after.mode is BridgeMode.DRY
 
 
 def test_up_walk_and_down() -> None:
-    """From limp over standing up, standing, walking, lying down to limp, each named once."""
+    """From passive over standing up, standing, walking, lying down to passive, each named once."""
     state, named = SUPERVISOR.initial(0, armed=True), list[BridgeMode]()
     ends = round(1000 * CONFIG.bridge.stand_s)
-    wishes = [Wish.STAND] * (ends + 3) + [Wish.WALK] * 50 + [Wish.LIE] * (ends + 1003)
-    for now, wish in enumerate(wishes):
-        state, supervised = step(state, at(now, wish=wish))
+    requests = [Request.STAND] * (ends + 3) + [Request.WALK] * 50 + [Request.LIE] * (ends + 1003)
+    for now, request in enumerate(requests):
+        state, supervised = step(state, at(now, request=request))
         named += [mode for mode, _ in supervised.changes]
         assert supervised.targets is not None
     assert named == [
@@ -68,34 +69,20 @@ def test_up_walk_and_down() -> None:
         BridgeMode.STANDING,
         BridgeMode.WALKING,
         BridgeMode.LYING_DOWN,
-        BridgeMode.LETTING_GO,
-        BridgeMode.LIMP,
+        BridgeMode.RELEASING,
+        BridgeMode.PASSIVE,
     ]
 
 
-def test_weighing_presses_by_diagonals_and_ends_in_the_stand() -> None:
-    state, calves = in_mode(BridgeMode.STANDING), list[list[float]]()
-    for now in range(4000):
-        state, supervised = step(state, at(now, wish=Wish.WEIGH if now == 0 else Wish.STAND))
-        assert supervised.targets is not None
-        calves.append((supervised.targets.q - ROBOT.q_stand)[2::3].tolist())
-    assert state.mode is BridgeMode.STANDING
-    off = np.array(calves)
-    np.testing.assert_allclose(off[:, [0, 1]], off[:, [3, 2]], atol=1e-9)
-    np.testing.assert_allclose(off[:, 0], -off[:, 1], atol=1e-9)
-    assert off.max() == pytest.approx(-off.min())
-    assert off.max() > 0.02
-
-
-def test_a_limp_robot_has_its_motors_off() -> None:
-    _, supervised = step(in_mode(BridgeMode.LIMP), at())
+def test_a_passive_robot_has_its_motors_off() -> None:
+    _, supervised = step(in_mode(BridgeMode.PASSIVE), at())
     assert supervised.targets is not None
     assert (supervised.targets.mode == OFF).all()
     np.testing.assert_array_equal(supervised.targets.kp, 0.0)
 
 
 def test_walking_passes_the_agents_command_on() -> None:
-    _, supervised = step(in_mode(BridgeMode.WALKING), at(wish=Wish.WALK, command_age=3))
+    _, supervised = step(in_mode(BridgeMode.WALKING), at(request=Request.WALK, command_age=3))
     targets = supervised.targets
     assert targets is not None
     np.testing.assert_allclose(targets.tau, COMMAND.tau)
@@ -107,15 +94,15 @@ def test_a_late_agent_is_waited_for_with_the_joints_held_then_the_robot_stops() 
     state = in_mode(BridgeMode.WALKING)
     hold, damp = CONFIG.bridge.hold_ms, CONFIG.bridge.damp_ms
     first = standing(CONFIG, q=ROBOT.q_stand + 0.1)
-    state, held = step(state, at(wish=Wish.WALK, report=first, command_age=hold + 1))
+    state, held = step(state, at(request=Request.WALK, report=first, command_age=hold + 1))
     assert held.targets is not None
     np.testing.assert_allclose(held.targets.q, first.q)
-    state, held = step(state, at(102, wish=Wish.WALK, command_age=damp))
+    state, held = step(state, at(102, request=Request.WALK, command_age=damp))
     assert held.targets is not None
     np.testing.assert_allclose(held.targets.q, first.q)
-    fresh, _ = step(state, at(103, wish=Wish.WALK, command_age=0))
+    fresh, _ = step(state, at(103, request=Request.WALK, command_age=0))
     assert (fresh.mode, fresh.held) == (BridgeMode.WALKING, None)
-    stopped, supervised = step(state, at(103, wish=Wish.WALK, command_age=damp + 1))
+    stopped, supervised = step(state, at(103, request=Request.WALK, command_age=damp + 1))
     assert (stopped.mode, stopped.reason) == (BridgeMode.STOPPED, f"command-late:{damp + 1} ms")
     assert supervised.targets is not None
     np.testing.assert_array_equal(supervised.targets.kp, 0.0)
@@ -136,12 +123,12 @@ SICK = {
 @pytest.mark.parametrize("mode", [BridgeMode.STANDING, BridgeMode.WALKING])
 @pytest.mark.parametrize("reason", list(SICK))
 def test_a_sick_robot_stops_for_good(mode: BridgeMode, reason: str) -> None:
-    state, supervised = step(in_mode(mode), at(wish=Wish.WALK, report=SICK[reason]))
+    state, supervised = step(in_mode(mode), at(request=Request.WALK, report=SICK[reason]))
     assert state.mode is BridgeMode.STOPPED
     assert state.reason.partition(":")[0] == reason
     assert supervised.changes == ((BridgeMode.STOPPED, state.reason),)
-    for wish in Wish:  # nothing brings it back
-        again, _ = step(state, at(101, wish=wish))
+    for request in Request:  # nothing brings it back
+        again, _ = step(state, at(101, request=request))
         assert again.mode is BridgeMode.STOPPED
 
 
@@ -173,11 +160,11 @@ def test_a_joint_that_stays_too_fast_stops_the_robot(period: int, joint: int, si
     dq[joint] = sign * 1.01 * CONFIG.bridge.speed_share * ROBOT.speed[joint % 3]
     fast, state = standing(CONFIG, dq=dq), in_mode(BridgeMode.WALKING, sent=100)
     for now in range(100 + period, 100 + CONFIG.bridge.speed_ms + 1, period):
-        state, _ = step(state, at(now, wish=Wish.WALK, report=fast))
+        state, _ = step(state, at(now, request=Request.WALK, report=fast))
         assert state.mode is BridgeMode.WALKING
-    calm, _ = step(state, at(now + 1, wish=Wish.WALK))
+    calm, _ = step(state, at(now + 1, request=Request.WALK))
     assert (calm.mode, calm.fast_ms) == (BridgeMode.WALKING, 0)
-    state, _ = step(state, at(now + period, wish=Wish.WALK, report=fast))
+    state, _ = step(state, at(now + period, request=Request.WALK, report=fast))
     assert state.mode is BridgeMode.STOPPED
     assert state.reason.startswith(f"speed:{JOINT_NAMES[joint]} ")
 
@@ -194,8 +181,8 @@ def test_an_emergency_stop_of_the_team_stops_a_robot_in_every_state(mode: Bridge
     [
         ({"report_age": 71}, "report-late"),
         ({"writers": 1}, "second-writer"),
-        ({"writers": 1, "stall": 71}, "bridge-late"),  # it is the guard
-        ({"writers": 1, "guarded": False}, "guard-gone"),
+        ({"writers": 1, "stall": 71}, "bridge-late"),  # it is the watchdog
+        ({"writers": 1, "watched": False}, "watchdog-gone"),
     ],
 )
 def test_a_lost_robot_or_another_writer_stops_it(fields: dict[str, Any], reason: str) -> None:
@@ -203,28 +190,28 @@ def test_a_lost_robot_or_another_writer_stops_it(fields: dict[str, Any], reason:
     assert state.reason.partition(":")[0] == reason
 
 
-def test_a_stopped_robot_is_damped_and_then_limp() -> None:
+def test_a_stopped_robot_is_damped_and_then_passive() -> None:
     state = in_mode(BridgeMode.STOPPED, since=0)
-    passive = round(1000 * CONFIG.bridge.passive_s)
-    _, damped = step(state, at(passive))
-    _, limp = step(state, at(passive + 1))
+    end = round(1000 * CONFIG.bridge.passive_s)
+    _, damped = step(state, at(end))
+    _, passive = step(state, at(end + 1))
     assert damped.targets is not None
-    assert limp.targets is not None
+    assert passive.targets is not None
     assert (damped.targets.mode == SERVO).all()
-    assert (limp.targets.mode == OFF).all()
+    assert (passive.targets.mode == OFF).all()
 
 
-def test_the_stop_buttons_hold_a_limp_robot_down_too() -> None:
-    inputs = at(wish=Wish.STAND, report=standing(CONFIG, remote=pressing("L2", "B")))
-    assert step(in_mode(BridgeMode.LIMP), inputs)[0].mode is BridgeMode.STOPPED
-    one = at(wish=Wish.STAND, report=standing(CONFIG, remote=pressing("B")))
-    assert step(in_mode(BridgeMode.LIMP), one)[0].mode is BridgeMode.STANDING_UP
+def test_the_stop_buttons_hold_a_passive_robot_down_too() -> None:
+    inputs = at(request=Request.STAND, report=standing(CONFIG, remote=pressing("L2", "B")))
+    assert step(in_mode(BridgeMode.PASSIVE), inputs)[0].mode is BridgeMode.STOPPED
+    one = at(request=Request.STAND, report=standing(CONFIG, remote=pressing("B")))
+    assert step(in_mode(BridgeMode.PASSIVE), one)[0].mode is BridgeMode.STANDING_UP
 
 
 def test_nobody_walks_before_the_agent_has_spoken() -> None:
     standing_still = in_mode(BridgeMode.STANDING)
     for fields in ({"command": None}, {"command_age": 21}):
-        state, _ = step(standing_still, at(wish=Wish.WALK, **fields))
+        state, _ = step(standing_still, at(request=Request.WALK, **fields))
         assert state.mode is BridgeMode.STANDING
 
 

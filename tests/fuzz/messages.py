@@ -36,9 +36,8 @@ from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.envelope import envelope
 from quadriga.shared.wire.messages import LiveFault
 from quadriga.shared.wire.topics import TABLE
-from quadriga.sim_server.world.faults.components import build_components
-from quadriga.sim_server.world.faults.fault import KINDS as FAULT_KINDS
-from quadriga.sim_server.world.faults.fault import parse_faults, with_time
+from quadriga.sim_server.world.faults import KINDS as FAULT_KINDS
+from quadriga.sim_server.world.faults import build_components, parse_faults, with_time
 from quadriga.status.gather import StatusFold
 from quadriga.team.running_team import RunningTeam, choose_team, read_running_team, to_json
 from tests.a1 import standing as standing_state

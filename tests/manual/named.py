@@ -22,8 +22,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.places import SOURCE
-from quadriga.sim_server.world.faults.components import build_components
-from quadriga.sim_server.world.faults.fault import parse_faults, with_time
+from quadriga.sim_server.world.faults import build_components, parse_faults, with_time
 from quadriga.stop_times.ways import WAYS
 from quadriga.team import scenarios
 
@@ -123,8 +122,8 @@ def _check_bench_stop(arguments: argparse.Namespace, _config: Config) -> None:
 
 
 def _check_sim(arguments: argparse.Namespace, config: Config) -> None:
-    if arguments.native and arguments.native != config.team.robot:
-        raise ConfigError("--as", repr(arguments.native), repr(config.team.robot))
+    if arguments.emulated and arguments.emulated != config.team.robot:
+        raise ConfigError("--as", repr(arguments.emulated), repr(config.team.robot))
 
 
 def _check_certs(arguments: argparse.Namespace, _config: Config) -> None:

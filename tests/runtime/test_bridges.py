@@ -106,15 +106,15 @@ def test_a_robot_stands_up_walks_and_lies_down_through_its_own_protocol(
     out = tmp_path / "run"
     done = walk(file, out, "--armed")
     said = (out / "logs" / "plant_r1.log").read_text(encoding="utf-8")
-    ways = ["r1: standing-up", "r1: weighing", "r1: feet calibrated", "r1: walking"]
+    ways = ["r1: standing-up", "r1: standing", "r1: walking"]
     # Where a busy machine gives it too little time it stops, with a reason: a good end, too.
     stopped = "r1: stopped " in said or "r1 stopped" in done.stdout
-    ways += [] if "r1: stopped " in said else ["r1: lying-down", "r1: letting-go", "r1: limp"]
+    ways += [] if "r1: stopped " in said else ["r1: lying-down", "r1: releasing", "r1: passive"]
     assert [way for way in ways if way in said] == ways, said
     assert stopped or done.returncode == 0, done.stdout + done.stderr
     recording = Recording(out / "run.mcap")
     told = [mode.partition(",")[0] for mode in modes_of(recording)]
-    assert told == ["standing-up", "standing", "weighing", "standing", "walking"]
+    assert told == ["standing-up", "standing", "walking"]
     if not stopped:
         assert max(m.y[1] for m in recording.messages(Measurement, "r1")) > 0.3, "it walks"
     assert replay_all(out) == ""
@@ -176,12 +176,12 @@ def process_of(file: Path, *words: str) -> int:
     return 0
 
 
-def guards() -> set[str]:
-    """Guards that run, by their process."""
+def watchdogs() -> set[str]:
+    """Watchdogs that run, by their process."""
     found = set()
     for folder in Path("/proc").glob("[0-9]*"):
         with suppress(OSError):
-            if b"quadriga.bridges.guard" in (folder / "cmdline").read_bytes():
+            if b"quadriga.bridges.watchdog" in (folder / "cmdline").read_bytes():
                 found.add(folder.name)
     return found
 
@@ -190,10 +190,10 @@ def guards() -> set[str]:
 @pytest.mark.parametrize(
     ("config", "number"), [("a1", signal.SIGKILL), ("go2", signal.SIGSTOP)], indirect=["config"]
 )
-def test_a_bridge_that_dies_or_hangs_leaves_a_robot_that_is_damped_and_then_limp(
+def test_a_bridge_that_dies_or_hangs_leaves_a_robot_that_is_damped_and_then_passive(
     file: Path, tmp_path: Path, number: signal.Signals
 ) -> None:
-    out, log, before = tmp_path / "run", tmp_path / "robots.log", guards()
+    out, log, before = tmp_path / "run", tmp_path / "robots.log", watchdogs()
     command = [*QUADRIGA, "walk", "--config", str(file), "--out", str(out), "--no-report"]
     command += ["--armed", "--seconds", "60"]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as walking:
@@ -204,7 +204,7 @@ def test_a_bridge_that_dies_or_hangs_leaves_a_robot_that_is_damped_and_then_limp
         os.kill(bridge, number)
         wait_until(lambda: motors_of(log)[-1] == "motors off")
         assert motors_of(log)[-3:] == ["motors driven", "motors damped", "motors off"]
-        wait_until(lambda: guards() <= before)  # it leaves by itself
+        wait_until(lambda: watchdogs() <= before)  # it leaves by itself
         if number is signal.SIGSTOP:
             os.kill(bridge, signal.SIGCONT)
             wait_until(lambda: "r1: stopped " in said.read_text(encoding="utf-8"))

@@ -22,7 +22,7 @@ from quadriga.shared.config.load import load
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.members import OPERATOR
 from quadriga.shared.runtime.clock import monotonic, sleep
-from quadriga.sim_server.native.link import LinkFaults
+from quadriga.sim_server.emulator.link import LinkFaults
 from quadriga.team.launch import Launch, process_table
 
 pytestmark = pytest.mark.skipif(os.geteuid() != 0, reason="namespaces need root")

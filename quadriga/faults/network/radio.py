@@ -7,7 +7,7 @@ from itertools import permutations
 from typing import Final
 
 from quadriga.faults.network.order import RadioOrder
-from quadriga.sim_server.native.link import NO_FAULTS, Link, Parcel
+from quadriga.sim_server.emulator.link import NO_FAULTS, Link, Parcel
 
 _IPV4: Final = 0x4  # the first half of a packet's first byte
 _LAST_OF_DESTINATION: Final = 19  # byte of an IPv4 header

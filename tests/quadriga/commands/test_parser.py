@@ -38,7 +38,6 @@ def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, 
         (["sim", "--set", "nonsense"], "expected section.key=value"),
         (["sim", "--config", "/nowhere/team.toml"], "/nowhere/team.toml: got No such file"),
         (["sim", "--hung"], "--hung: got no --as, expected --as with a kind of robot"),
-        (["sim", "--as", "a1", "--do", "r1 los 1"], "order: got 'los', expected r1 and one of"),
         (["sim", "--as", "a1", "--truth", "/nowhere/t.csv"], "/nowhere/t.csv: got No such file"),
         (["sim", "--robot", "r1"], "--robot: got 'r1', expected nothing (team.plants is 'one')"),
         (

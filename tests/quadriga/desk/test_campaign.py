@@ -16,11 +16,14 @@ from quadriga.desk.page import PUBLISHED, to_markdown
 from quadriga.desk.tables import build_fault_table, build_walk_table, is_too_slow, outcome_of
 from quadriga.shared.config.load import load
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.places import SOURCE
-from quadriga.sim_server.native.orders import parse_order
+from quadriga.shared.unitree.codecs import A1
+from quadriga.shared.unitree.udp import Address
+from quadriga.sim_server.emulator.board import UdpBoard
+from quadriga.sim_server.emulator.process import execute
 from quadriga.tables import Table
 from quadriga.team.trial_rows import ROWS, keep_config, read_rows
+from tests.bridges.test_udp_driver import HOST, free_port
 
 THROUGH = ("bridges", "no bridges")
 
@@ -37,8 +40,10 @@ def test_faults_by_name_in_the_order_of_the_table() -> None:
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
 def test_every_fault_is_one_that_the_desk_understands(fault: Any) -> None:
     assert fault.orders or fault.processes
+    board = UdpBoard(A1, Address(HOST, free_port()))
     for order in fault.orders:
-        parse_order(f"r2 {order}", robot_names(2))
+        assert execute(f"r2 {order}", {"r2": board}) == f"r2 {order}"
+    board.close()
 
 
 def row(fault: str, seed: int, **fields: Any) -> dict[str, Any]:

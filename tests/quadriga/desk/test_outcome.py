@@ -10,8 +10,7 @@ import pytest
 from quadriga.desk.outcome import describe_walk, read_truth, time_kept, time_to_rest, traces_of
 from quadriga.desk.robots import Said
 from quadriga.shared.wire.messages import Truth
-from quadriga.sim_server.native.news import LOST
-from quadriga.sim_server.native.truth_log import TruthLog
+from quadriga.sim_server.emulator.process import LOST, TRUTH_COLUMNS, truth_row
 
 NAMES = ("r1", "r2")
 
@@ -43,9 +42,9 @@ def test_the_file_of_truth_and_a_recorded_truth_are_the_same_traces(
     truths: list[Truth], tmp_path: Path
 ) -> None:
     path = tmp_path / "truth.csv"
-    with TruthLog(path, NAMES) as log:
-        for truth in truths:
-            log.note(truth)
+    header = ["ms", *(f"{name}_{column}" for name in NAMES for column in TRUTH_COLUMNS)]
+    rows = [[truth.tick, *truth_row(truth)] for truth in truths]
+    np.savetxt(path, rows, fmt="%.6f", delimiter=",", header=",".join(header), comments="")
     for read, recorded in zip(read_truth(path, NAMES).values(), traces_of(truths), strict=True):
         for field in ("ms", "xyz", "rpy", "velocity"):
             np.testing.assert_allclose(getattr(read, field), getattr(recorded, field), atol=1e-5)

@@ -14,8 +14,7 @@ from quadriga.shared.errors import ConfigError
 from quadriga.shared.members import OPERATOR
 from quadriga.shared.robot.robots import ROBOTS
 from quadriga.shared.runtime.clock import monotonic
-from quadriga.sim_server.world.faults.components import build_components
-from quadriga.sim_server.world.faults.fault import parse_faults
+from quadriga.sim_server.world.faults import build_components, parse_faults
 from quadriga.team.launch import Launch, ProcessSpec, process_table
 
 _SLEEPER = ProcessSpec(OPERATOR, (sys.executable, "-c", "import time; time.sleep(60)"), 1.0)

@@ -13,7 +13,7 @@ from quadriga.faults.fault import Draw
 from quadriga.faults.link_faults import LINK_WORDS, LINKS
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
-from quadriga.sim_server.world.faults.fault import KINDS
+from quadriga.sim_server.world.faults import KINDS
 
 
 @pytest.mark.parametrize(

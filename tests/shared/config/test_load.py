@@ -140,7 +140,7 @@ def test_every_key_keeps_its_range_and_has_a_plausible_default(section: str, ite
         ("[motors]\nrotor_inertia = false\n", r"motors\.rotor_inertia: got false with .* 0\.4"),
         (
             '[controller]\nfoot_load = "sensor"\n',
-            r"controller\.foot_load: got 'sensor' with sensors\.foot_sensor = 'counts'",
+            r"controller\.foot_load: got 'sensor' with feet that give counts",
         ),
         ("[team]\nspacing = 9.0\n", r"team\.spacing.*\[m\]"),
     ],

@@ -11,8 +11,11 @@ import pytest
 
 from quadriga.shared.errors import BridgeError
 from quadriga.shared.runtime.clock import monotonic, sleep
-from quadriga.shared.unitree import go2, rpc
+from quadriga.shared.unitree import rpc
+from quadriga.shared.unitree.codecs import GO2
 from quadriga.shared.unitree.dds import (
+    LOW_COMMANDS,
+    LOW_STATES,
     DdsParticipant,
     StructReader,
     StructWriter,
@@ -33,13 +36,9 @@ def participant() -> Iterator[DdsParticipant]:
         yield made
 
 
-def command_topic(participant: DdsParticipant) -> int:
-    return participant.struct_topic(go2.COMMAND_TOPIC, go2.COMMAND_TYPE, go2.COMMAND)
-
-
 def test_a_topic_has_no_type_information() -> None:
     """With it, processes of version 0.10 on the same topic end: the robot's own among them."""
-    for layout, typename in ((go2.COMMAND, go2.COMMAND_TYPE), (go2.REPORT, go2.REPORT_TYPE)):
+    for _, typename, layout in (LOW_COMMANDS, LOW_STATES):
         ops = operations(layout)
         descriptor, program = describe_topic(typename, layout.itemsize, layout.alignment, ops)
         for part in (descriptor.type_information, descriptor.type_mapping):
@@ -52,7 +51,7 @@ def test_the_python_package_is_never_imported() -> None:
     """It would send type information for whatever is declared through it."""
     code = (
         "import sys; from quadriga.shared.unitree.dds import load_library; "
-        "import quadriga.bridges.go2_driver, quadriga.sim_server.native.go2_robot; "
+        "import quadriga.bridges.drivers, quadriga.sim_server.emulator.board; "
         "load_library(); print(any(name.split('.')[0] == 'cyclonedds' for name in sys.modules))"
     )
     done = subprocess.run(
@@ -63,31 +62,30 @@ def test_the_python_package_is_never_imported() -> None:
 
 
 def test_what_is_written_is_read_to_the_byte(participant: DdsParticipant) -> None:
-    topic = command_topic(participant)
-    writer = StructWriter(participant, topic, go2.COMMAND.itemsize)
-    reader = StructReader(participant, topic, go2.COMMAND.itemsize)
+    writer = StructWriter(participant, LOW_COMMANDS)
+    reader = StructReader(participant, LOW_COMMANDS)
     random = np.random.default_rng(0)
     rows = random.normal(size=(5, 12))
-    packet = go2.GO2.encode_command(MotorTargets(np.ones(12, np.uint8), *rows))
+    packet = GO2.encode_command(MotorTargets(np.ones(12, np.uint8), *rows))
     assert reader.take() is None
-    assert writer.write(packet)
+    assert writer.send(packet)
     deadline = monotonic() + WAIT
     while (read := reader.take()) is None:
         assert monotonic() < deadline
         sleep(0.001)
     assert read == packet
     assert reader.take() is None
-    witness = StructReader(participant, topic, go2.COMMAND.itemsize, of_others=True)
+    witness = StructReader(participant, LOW_COMMANDS, of_others=True)
     packets = [bytes([k]) + packet[1:] for k in range(100)]
-    assert all([writer.write(sent) for sent in packets])
+    assert all([writer.send(sent) for sent in packets])
     sleep(0.05)  # a late process gets them all
     assert [reader.take() for _ in packets] == packets
     first = reader.writer
     with DdsParticipant(DOMAIN, "lo") as other:
-        foreign = StructWriter(other, command_topic(other), go2.COMMAND.itemsize)
+        foreign = StructWriter(other, LOW_COMMANDS)
         while witness.take() is None:
             assert monotonic() < deadline
-            foreign.write(packet)
+            foreign.send(packet)
             sleep(0.001)
         assert reader.take() == packet
         assert reader.writer == witness.writer != first

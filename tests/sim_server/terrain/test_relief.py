@@ -8,8 +8,7 @@ import pytest
 from quadriga.shared.config.terrains import TERRAINS
 from quadriga.sim_server.terrain.relief import Relief
 from quadriga.sim_server.terrain.terrain import build_terrain
-from quadriga.sim_server.world.payload import build_loads
-from quadriga.sim_server.world.scenario import build_scenario
+from quadriga.sim_server.world.scenario import build_loads, build_scenario
 from quadriga.sim_server.world.team_model import formation
 from quadriga.sim_server.world.world import World
 from tests.sim_server.standing import configured, shift, stand

@@ -9,7 +9,7 @@ import pytest
 
 from quadriga.shared.config.sections import ReferenceConfig
 from quadriga.shared.robot.conventions import GRAVITY, Array
-from quadriga.sim_server.terrain.stairs import Stairs
+from quadriga.sim_server.terrain.ground import Stairs
 from quadriga.sim_server.terrain.terrain import build_terrain
 from quadriga.sim_server.world.team_model import formation
 from quadriga.sim_server.world.world import World

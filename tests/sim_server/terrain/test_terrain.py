@@ -9,8 +9,8 @@ import pytest
 from quadriga.shared.config.reference_trace import inline_trace, trace_of
 from quadriga.shared.config.sections import Config, ReferenceConfig
 from quadriga.shared.robot.conventions import Array
-from quadriga.sim_server.terrain.course import build_course
-from quadriga.sim_server.terrain.height_field import HeightField
+from quadriga.sim_server.terrain.ground import HeightField
+from quadriga.sim_server.terrain.relief import build_course
 from quadriga.sim_server.terrain.terrain import Terrain, build_terrain
 from quadriga.sim_server.world.team_model import build_team_model, formation
 from tests.sim_server.standing import configured

@@ -1,8 +1,32 @@
-import numpy as np
+"""Loads, pushes and weak motors: their grammar, what is drawn of them, and their events."""
 
-from quadriga.sim_server.world.payload import build_loads
-from quadriga.sim_server.world.scenario import build_scenario
+from __future__ import annotations
+
+import math
+from collections import Counter
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import ConfigError
+from quadriga.shared.robot.conventions import JOINT_NAMES, robot_names
+from quadriga.sim_server.world.scenario import (
+    Push,
+    WeakMotor,
+    build_loads,
+    build_scenario,
+    parse_pushes,
+    push_series,
+    weak_motors,
+)
+from quadriga.sim_server.world.team_model import build_team_model
 from tests.sim_server.standing import configured
+
+NAMES = robot_names(3)
 
 
 def test_forces_add_up_and_end() -> None:
@@ -78,3 +102,168 @@ def test_a_motor_is_weak_from_its_tick_on_and_gives_what_is_announced() -> None:
         strength = scenario.strength(tick)
         assert strength[1, 3] == share
         assert strength.sum() == 23 + share
+
+
+def masses(config: Config) -> list[float]:
+    return [load.mass for load in build_loads(config)]
+
+
+def test_a_load_is_shared_carried_by_one_or_by_some_with_shares_of_their_own() -> None:
+    assert masses(configured(4, payload=10.0)) == [2.5] * 4
+    assert masses(configured(3, payload=9.0, payload_on="r2")) == [0.0, 9.0, 0.0]
+    assert masses(configured(3, payload=9.0, payload_on="r2, r3")) == [0.0, 4.5, 4.5]
+    assert masses(configured(3, payload=10.0, payload_on="r1:6,r3:4")) == [6.0, 0.0, 4.0]
+    swept = masses(configured(3, payload=20.0, payload_on="r1:6,r3:4"))
+    assert swept == pytest.approx([12.0, 0.0, 8.0])
+
+
+def test_a_load_lies_somewhere_else_with_another_seed() -> None:
+    places = np.array(
+        [
+            [
+                load.offset
+                for load in build_loads(configured(2, payload=1.0, payload_scatter=0.05, seed=s))
+            ]
+            for s in range(50)
+        ]
+    )
+    assert np.abs(places).max() <= 0.05
+    assert places.std(axis=0).min() > 0.02
+    assert not np.allclose(places[:, 0], places[:, 1])
+    assert build_loads(configured(2, payload=1.0, seed=3))[0].offset == (0.0, 0.0)
+
+
+def test_who_else_carries_something_does_not_move_a_load() -> None:
+    all_of_them = build_loads(configured(5, payload=9.0, payload_scatter=0.05, seed=4))
+    alone = build_loads(configured(2, payload=9.0, payload_scatter=0.05, seed=4, payload_on="r2"))
+    assert alone[1].offset == all_of_them[1].offset
+
+
+def test_the_world_has_the_load_where_it_is_said_to_be() -> None:
+    config = configured(2, payload=9.0, payload_on="r2", payload_scatter=0.1, seed=3)
+    model, load = build_team_model(config).model, build_loads(config)[1]
+    assert model.body("r2/payload").mass == pytest.approx([9.0])
+    np.testing.assert_allclose(model.body("r2/payload").pos[:2], load.offset)
+    x, y = load.offset
+    assert load.detail == f"9 kg, {1000 * x:+.0f} mm ahead, {1000 * y:+.0f} mm left"
+
+
+def test_pushes_are_parsed() -> None:
+    first, second = parse_pushes("r2:80:90:1:0.2, all:-0:0:0:0.001", NAMES)
+    assert (first.robots, first.force, first.start, first.stop) == ((1,), 80.0, 1000, 1200)
+    assert first.direction == pytest.approx(math.pi / 2)
+    assert second.robots == (0, 1, 2)
+    assert parse_pushes("", NAMES) == ()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("r1:80:0:1", "robot:force"),
+        ("r1:80:0:1:0.2:3", "robot:force"),
+        ("r9:80:0:1:0.2", "robot 'r9'"),
+        ("r1:strong:0:1:0.2", "robot:force"),
+        ("r1:-5:0:1:0.2", "force -5"),
+        ("r1:nan:0:1:0.2", "force nan"),
+        ("r1:1e9:0:1:0.2", r"force 1e\+09"),
+        ("r1:80:inf:1:0.2", "direction inf"),
+        ("r1:80:0:-1:0.2", "start -1"),
+        ("r1:80:0:1:0", "duration 0"),
+        ("r1:80:0:1:0.2,", "robot:force"),
+        (",", "robot:force"),
+    ],
+)
+def test_a_wrong_push_names_the_key_and_what_is_wrong(text: str, message: str) -> None:
+    with pytest.raises(ConfigError, match=rf"^world\.push: .*{message}"):
+        parse_pushes(text, NAMES)
+
+
+@given(st.text(alphabet="rall0123:.,- e", max_size=30))
+def test_any_text_is_parsed_or_refused(text: str) -> None:
+    try:
+        pushes = parse_pushes(text, NAMES)
+    except ConfigError:
+        return  # anything else fails the test
+    assert len(pushes) == (text.count(",") + 1 if text else 0)
+
+
+def series(seed: int = 0, **world: Any) -> tuple[Push, ...]:
+    config = configured(3, **{"push_force": 80.0, "seconds": 20.0} | world)
+    return push_series(config, np.random.default_rng(seed))
+
+
+def test_a_series_pushes_the_robots_in_turn_sideways() -> None:
+    pushes = series(push_every=2.0, push_duration=0.1)
+    assert len(pushes) == 9
+    assert Counter(push.robots for push in pushes) == {(0,): 3, (1,): 3, (2,): 3}
+    assert len({push.robots for push in pushes[:3]}) == 3
+    assert {push.force for push in pushes} == {80.0}
+    assert {abs(push.direction) for push in pushes} == {math.pi / 2.0}
+    assert {push.stop - push.start for push in pushes} == {100}
+    for k, push in enumerate(pushes, start=1):
+        assert 2000 * k <= push.start < 2000 * k + 400  # within one period of the gait
+
+
+def test_another_seed_pushes_others_at_other_times_from_other_sides() -> None:
+    many = [series(seed) for seed in range(40)]
+    assert series(3) == series(3)
+    assert len({tuple((p.robots, p.direction, p.start) for p in pushes) for pushes in many}) == 40
+    assert {pushes[0].robots for pushes in many} == {(0,), (1,), (2,)}
+    assert len({pushes[0].direction for pushes in many}) == 2
+    assert len({pushes[0].start for pushes in many}) > 30
+
+
+def test_the_force_sweeps_a_series_without_moving_it() -> None:
+    weak, strong = series(push_force=80.0), series(push_force=240.0)
+    assert [(p.robots, p.direction, p.start) for p in weak] == [
+        (p.robots, p.direction, p.start) for p in strong
+    ]
+    assert {push.force for push in strong} == {240.0}
+    spread = [p.force for seed in range(20) for p in series(seed, push_spread=0.2)]
+    assert 64.0 <= min(spread) < 68.0
+    assert 92.0 < max(spread) <= 96.0
+    assert series(push_force=0.0) == ()
+
+
+def weak(text: str, seed: int = 0) -> tuple[WeakMotor, ...]:
+    return weak_motors(configured(3, weak_motor=text), np.random.default_rng(seed))
+
+
+def test_motors_are_named_by_robot_and_joint() -> None:
+    first, second = weak("r2:RL_thigh:1.5, r3:FL_hip:0")
+    assert (first.robot, JOINT_NAMES[first.joint], first.start) == (1, "RL_thigh_joint", 1500)
+    assert (second.robot, JOINT_NAMES[second.joint], second.start) == (2, "FL_hip_joint", 0)
+    assert first.share == 0.6
+    assert weak("") == ()
+
+
+@pytest.mark.parametrize(
+    ("joint", "among"),
+    [
+        ("calf", {"FL_calf_joint", "FR_calf_joint", "RL_calf_joint", "RR_calf_joint"}),
+        ("RR", {"RR_hip_joint", "RR_thigh_joint", "RR_calf_joint"}),
+        ("any", set(JOINT_NAMES)),
+    ],
+)
+def test_what_is_left_open_is_drawn_from_the_seed(joint: str, among: set[str]) -> None:
+    found = [weak(f"any:{joint}:2", seed)[0] for seed in range(100)]
+    assert {JOINT_NAMES[motor.joint] for motor in found} == among
+    assert {motor.robot for motor in found} == {0, 1, 2}
+    assert weak(f"any:{joint}:2", 7) == weak(f"any:{joint}:2", 7)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("r1:calf", "robot:joint:start"),
+        ("r4:calf:0", "robot 'r4'"),
+        ("r1:knee:0", "joint 'knee'"),
+        ("r1:calf:soon", "start 'soon'"),
+        ("r1:calf:-1", "start '-1'"),
+        ("r1:calf:nan", "start 'nan'"),
+        ("r1:calf:0,", "robot:joint:start"),
+    ],
+)
+def test_a_wrong_motor_names_the_key_and_what_is_wrong(text: str, message: str) -> None:
+    with pytest.raises(ConfigError, match=rf"^world\.weak_motor: .*{message}"):
+        weak(text)

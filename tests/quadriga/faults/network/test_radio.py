@@ -8,7 +8,7 @@ import pytest
 
 from quadriga.faults.network.order import RadioOrder
 from quadriga.faults.network.radio import Arrivals, Radio
-from quadriga.sim_server.native.link import LinkFaults
+from quadriga.sim_server.emulator.link import LinkFaults
 
 HOSTS = {254: "team", 1: "r1", 2: "r2"}
 GONE = LinkFaults(loss=1.0)

@@ -1,0 +1,1 @@
+"""Emulated robots: the simulated team behind the robots' own protocols, for bridges."""

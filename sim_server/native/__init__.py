@@ -1,1 +1,0 @@
-"""The simulated team behind the robots' own protocols, for bridges."""

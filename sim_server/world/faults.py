@@ -1,0 +1,367 @@
+"""Faults of sensors and motors: which parts of a robot can be faulty, and what they then say.
+
+`world.faults` and live faults follow one grammar: 'robot/component kind start[s] [duration[s]]',
+commas between faults.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import ConfigError, did_you_mean
+from quadriga.shared.robot.conventions import JOINT_NAMES, N_JOINTS, Array, Leg, robot_names
+from quadriga.shared.robot.spec import RobotSpec
+from quadriga.shared.wire import codes
+from quadriga.shared.wire.messages import Command, Event, Flat, State
+
+OFF: Final = "off"
+STUCK: Final = "stuck"
+GARBAGE: Final = "garbage"
+WRONG: Final = "wrong"
+SLOW: Final = "slow"
+DELAYED: Final = "delayed"
+INTERMITTENT: Final = "intermittent"
+# By name, what a faulty component does. The words are those of PX4's failure injection.
+KINDS: Final = {
+    OFF: "zero; a motor gives no torque",
+    STUCK: "the last sound value",
+    GARBAGE: "chance, within the component's range, anew every millisecond",
+    WRONG: "rates, forces and torques with the opposite sign, angles 0.2 rad off",
+    SLOW: "a new value every 50 ms only",
+    DELAYED: "50 ms late",
+    INTERMITTENT: "off for a random half of all spans of 50 ms",
+}
+SPAN_MS: Final = 50  # of what is slow, delayed or intermittent
+_AHEAD_MS: Final = SPAN_MS + 10  # from a word to the fault that it asks for
+_KEY: Final = "world.faults"
+_GRAMMAR: Final = "'robot/component kind start[s] [duration[s]]', commas between faults"
+_LATEST: Final = 3600.0  # s
+_STREAM: Final = 5  # of the seed; terrain, sensors, pushes and motors draw from others
+_OFF_BY: Final = 0.2  # rad, an angle that is wrong
+_GYRO_MOST: Final = 35.0  # rad/s, 2000 °/s: the range of usual gyros
+_ACCEL_MOST: Final = 157.0  # m/s², 16 g: the range of usual accelerometers
+_FOOT_MOST: Final = 500.0  # counts, or N: more than a foot of such a robot presses
+
+Columns = NDArray[np.intp]
+
+
+class Component(NamedTuple):
+    """A part of a robot that can be faulty.
+
+    Attributes:
+        message: `State` of a sensor, `Command` of a motor.
+        columns: its numbers in the message's row.
+        wrong: from sound numbers to those that it has when it is wrong.
+        low, high: between these it draws its numbers when it gives garbage.
+        unit_length: whether its numbers are an orientation: garbage has unit length.
+    """
+
+    message: type[Flat]
+    columns: Columns
+    wrong: Callable[[Array], Array]
+    low: Array
+    high: Array
+    unit_length: bool = False
+
+
+def build_components(robot: RobotSpec) -> Mapping[str, tuple[Component, ...]]:
+    """What of a kind of robot can be faulty, by name, with its parts.
+
+    Sensors are `imu`, its parts `attitude`, `gyro` and `accel`, `encoders` with angle and rate of
+    all joints and `encoder_FL_hip` …, `feet` and `foot_FL` …; motors are `motors`, `motor_FL` with
+    the three of a leg …, and `motor_FL_hip` ….
+    """
+    joints = np.arange(N_JOINTS)
+    names = [name.removesuffix("_joint") for name in JOINT_NAMES]
+    quat = _columns(State, "imu_quat_wxyz")
+    attitude = Component(State, quat, _tilt, np.full(4, -1.0), np.ones(4), unit_length=True)
+    gyro = _mirrored("imu_gyro", -_GYRO_MOST, _GYRO_MOST)
+    accel = _mirrored("imu_accel", -_ACCEL_MOST, _ACCEL_MOST)
+    parts = {"attitude": attitude, "gyro": gyro, "accel": accel}
+    parts["encoders"] = _encoders(robot, joints)
+    one = {name: joints[k : k + 1] for k, name in enumerate(names)}
+    parts |= {f"encoder_{name}": _encoders(robot, joint) for name, joint in one.items()}
+    parts["feet"] = _mirrored("foot_force", 0.0, _FOOT_MOST)
+    for leg in Leg:
+        parts[f"foot_{leg.name}"] = _mirrored("foot_force", 0.0, _FOOT_MOST, leg)
+    parts["motors"] = _motors(robot, joints)
+    parts |= {f"motor_{leg.name}": _motors(robot, joints[3 * leg : 3 * leg + 3]) for leg in Leg}
+    parts |= {f"motor_{name}": _motors(robot, joint) for name, joint in one.items()}
+    return {"imu": (attitude, gyro, accel), **{name: (part,) for name, part in parts.items()}}
+
+
+def _columns(message: type[Flat], field: str) -> Columns:
+    cut = message.CUTS[field]
+    return np.arange(cut.start, cut.stop)
+
+
+def _mirrored(field: str, low: float, high: float, leg: Leg | None = None) -> Component:
+    """A sensor whose wrong numbers have the opposite sign; of feet that of one leg."""
+    columns = _columns(State, field)
+    columns = columns if leg is None else columns[leg : leg + 1]
+    n = len(columns)
+    return Component(State, columns, np.negative, np.full(n, low), np.full(n, high))
+
+
+def _encoders(robot: RobotSpec, joints: Columns) -> Component:
+    n, speed = len(joints), np.tile(robot.speed, 4)[joints]
+    columns = np.concatenate([_columns(State, name)[joints] for name in ("q_joint", "v_joint")])
+    low = np.concatenate([np.array(robot.lower)[joints], -speed])
+    high = np.concatenate([np.array(robot.upper)[joints], speed])
+
+    def be_wrong(values: Array) -> Array:
+        return np.concatenate([values[:n] + _OFF_BY, -values[n:]])
+
+    return Component(State, columns, be_wrong, low, high)
+
+
+def _motors(robot: RobotSpec, joints: Columns) -> Component:
+    """Motors of these joints; a wrong one gives the opposite torque."""
+    n, torque = len(joints), robot.torque_limit[joints]
+    fields = ("tau", "kp", "kd", "q_des", "v_des")
+    columns = np.concatenate([_columns(Command, name)[joints] for name in fields])
+    high = np.concatenate([torque, np.zeros(4 * n)])
+
+    def be_wrong(values: Array) -> Array:
+        return np.concatenate([-values[: 3 * n], values[3 * n :]])
+
+    return Component(Command, columns, be_wrong, -high, high)
+
+
+def _tilt(quat_wxyz: Array) -> Array:
+    """The orientation, turned by `_OFF_BY` about the trunk's x axis."""
+    c, s = np.cos(0.5 * _OFF_BY), np.sin(0.5 * _OFF_BY)
+    w, x, y, z = quat_wxyz
+    return np.array([c * w - s * x, c * x + s * w, c * y + s * z, c * z - s * y])
+
+
+@dataclass(frozen=True, slots=True)
+class ComponentFault:
+    """What is wrong with one component of one robot, in ticks `start` to `stop` − 1.
+
+    Attributes:
+        robot: its name.
+        component: a name of `build_components`.
+        kind: a name of `KINDS`.
+        start: tick, ms.
+        stop: tick, ms; None: it never ends.
+    """
+
+    robot: str
+    component: str
+    kind: str
+    start: int
+    stop: int | None = None
+
+    def holds(self, tick: int) -> bool:
+        """Whether the component is faulty at this tick."""
+        return self.start <= tick and (self.stop is None or tick < self.stop)
+
+    @property
+    def detail(self) -> str:
+        """Detail of the event that announces its beginning."""
+        return f"{self.component} {self.kind}"
+
+
+def parse_faults(
+    text: str, robots: tuple[str, ...], components: tuple[str, ...]
+) -> tuple[ComponentFault, ...]:
+    """The faults that a text describes, in the order written; empty text means none.
+
+    Args:
+        text: of the grammar above.
+        robots: names of the team's robots.
+        components: names of what can be faulty.
+
+    Raises:
+        ConfigError: the text does not follow the grammar, or names what there is not.
+    """
+    if not text:
+        return ()
+    found = tuple(_parse(part.strip(), robots, components) for part in text.split(","))
+    for fault in found:
+        if found.count(fault) > 1:
+            raise ConfigError(_KEY, f"{fault.robot}/{fault.detail} twice", "each fault once")
+    return found
+
+
+def with_time(text: str, tick: int) -> str:
+    """A fault as `world.faults` has it, of one without its time: it begins some ms after a tick.
+
+    What a faulty component says may depend on what it has said in the 60 ms before.
+
+    Raises:
+        ConfigError: there are too few or too many words.
+    """
+    words = text.split()
+    if len(words) not in (2, 3):
+        raise ConfigError("fault", repr(text), "'robot/component kind [duration[s]]'")
+    return " ".join([*words[:2], f"{1e-3 * (tick + _AHEAD_MS):.3f}", *words[2:]])
+
+
+def _parse(part: str, robots: tuple[str, ...], components: tuple[str, ...]) -> ComponentFault:
+    words = part.split()
+    if len(words) not in (3, 4) or "/" not in words[0]:
+        raise ConfigError(_KEY, repr(part), _GRAMMAR)
+    (robot, _, component), kind = words[0].partition("/"), words[1]
+    for what, word, known in (
+        ("robot", robot, robots),
+        ("component", component, components),
+        ("kind", kind, tuple(KINDS)),
+    ):
+        if word not in known:
+            hint = did_you_mean(word, known)
+            raise ConfigError(_KEY, f"{what} {word!r}", f"one of {', '.join(known)}", hint)
+    first = _milliseconds("start", words[2], part, 0.0)
+    stop = first + _milliseconds("duration", words[3], part, 1e-3) if len(words) == 4 else None
+    return ComponentFault(robot, component, kind, first, stop)
+
+
+def _milliseconds(what: str, word: str, part: str, least: float) -> int:
+    try:
+        value = float(word)
+    except ValueError:
+        value = math.nan
+    if not least <= value <= _LATEST:  # this way round, it refuses what is not a number, too
+        raise ConfigError(_KEY, f"{what} {word!r} in {part!r}", f"{least:g} … {_LATEST:g} s")
+    return round(1000 * value)
+
+
+class Distortion:
+    """One fault at one component; its memory is what the component said before.
+
+    Args:
+        fault: what is wrong, and when.
+        component: whose numbers it changes.
+        random: its own source of chance.
+
+    Attributes:
+        component: as given.
+    """
+
+    def __init__(
+        self, fault: ComponentFault, component: Component, random: np.random.Generator
+    ) -> None:
+        self.component = component
+        self._fault, self._random = fault, random
+        self._sound = deque[Array](maxlen=SPAN_MS + 1)  # the newest sound numbers
+        self._held: Array | None = None
+        self._off = False
+
+    def distort(self, tick: int, values: Array) -> Array:
+        """The component's numbers at a tick, of the sound ones.
+
+        Args:
+            tick: one more than at the last call.
+            values: sound numbers, in the order of the component's columns.
+        """
+        fault, component = self._fault, self.component
+        if not fault.holds(tick):
+            self._sound.append(values)
+            return values
+        before = self._sound[-1] if self._sound else values
+        if fault.kind == DELAYED:
+            self._sound.append(values)
+            return self._sound[0]
+        if self._held is None or (tick - fault.start) % SPAN_MS == 0:
+            self._held = values
+            self._off = bool(self._random.random() < 0.5)
+        if fault.kind == OFF or (fault.kind == INTERMITTENT and self._off):
+            return np.zeros_like(values)
+        if fault.kind == STUCK:
+            return before
+        if fault.kind == WRONG:
+            return component.wrong(values)
+        if fault.kind == SLOW:
+            return self._held
+        if fault.kind == GARBAGE:
+            drawn = self._random.uniform(component.low, component.high)
+            return drawn / np.linalg.norm(drawn) if component.unit_length else drawn
+        return values
+
+
+class Injection:
+    """The faults of `world.faults`, and those added later; without any it costs nothing.
+
+    Attributes:
+        events: when each fault of the configuration begins and ends.
+
+    Args:
+        config: the team's configuration.
+        names: of the robots that are in the world, in the order of their rows.
+
+    Raises:
+        ConfigError: `world.faults` does not parse, or names what there is not.
+    """
+
+    def __init__(self, config: Config, names: Sequence[str]) -> None:
+        self._components = build_components(config.robot)
+        self._team, self._names = robot_names(config.team.robots), tuple(names)
+        self._seed, self._count = config.world.seed, 0
+        self._sensors: dict[str, list[Distortion]] = {}
+        self._motors: dict[int, list[Distortion]] = {}
+        self.events = self.add(config.world.faults)
+
+    def add(self, text: str) -> list[Event]:
+        """Add faults that have not begun; when each begins and ends.
+
+        Raises:
+            ConfigError: the text does not parse, or names what there is not.
+        """
+        found = list[Event]()
+        for fault in parse_faults(text, self._team, tuple(self._components)):
+            self._add(fault)
+            found.append(Event.of(fault.start, codes.FAULT_BEGINS, fault.robot, fault.detail))
+            if fault.stop is not None:
+                detail = f"{fault.component} sound again"
+                found.append(Event.of(fault.stop, codes.FAULT_ENDS, fault.robot, detail))
+        return found
+
+    def _add(self, fault: ComponentFault) -> None:
+        number, self._count = self._count, self._count + 1
+        if fault.robot not in self._names:
+            return
+        for part, component in enumerate(self._components[fault.component]):
+            chance = np.random.default_rng((self._seed, _STREAM, number, part))
+            made = Distortion(fault, component, chance)
+            if component.message is State:
+                self._sensors.setdefault(fault.robot, []).append(made)
+            else:
+                self._motors.setdefault(self._names.index(fault.robot), []).append(made)
+
+    def distort_states(self, states: Mapping[str, State]) -> dict[str, State]:
+        """What faulty sensors make of the states of a tick, by robot; called once a tick."""
+        distorted = dict(states)
+        for name, distortions in self._sensors.items():
+            state = states[name]
+            row = _distort(state.row, state.tick, distortions)
+            distorted[name] = State.from_row(state.tick, state.stamp_ns, row)
+        return distorted
+
+    def distort_commands(self, tick: int, rows: Sequence[Array]) -> list[Array]:
+        """What faulty motors make of the rows of `Command`s of a tick; called once a tick.
+
+        Args:
+            tick: at which the motors are driven.
+            rows: one for each robot of the world, (60,).
+        """
+        distorted = list(rows)
+        for index, distortions in self._motors.items():
+            distorted[index] = _distort(rows[index], tick, distortions)
+        return distorted
+
+
+def _distort(row: Array, tick: int, distortions: Sequence[Distortion]) -> Array:
+    row = row.copy()
+    for one in distortions:
+        columns = one.component.columns
+        row[columns] = one.distort(tick, row[columns])
+    return row

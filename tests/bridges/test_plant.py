@@ -1,0 +1,220 @@
+"""The plant of one robot, on real sockets, with a board that answers by the millisecond."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from quadriga.bridges.drivers import RobotDriver, open_driver
+from quadriga.bridges.plant import RobotPlant, build_bridge, to_state, yaw_of
+from quadriga.bridges.supervisor import BridgeMode, Request
+from quadriga.bridges.watchdog import Watchdog
+from quadriga.shared.config.load import load
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import CheckError
+from quadriga.shared.runtime.clock import sleep
+from quadriga.shared.unitree.codecs import A1
+from quadriga.shared.unitree.packets import OFF, SERVO, MotorTargets, RobotReport
+from quadriga.shared.unitree.udp import Address, UdpPort
+from quadriga.shared.wire.messages import Command, Status
+from tests.bridges.robots import config_of, real_go1_counts, standing, tilted
+from tests.bridges.test_udp_driver import HOST, free_port
+
+
+class Board:
+    """Sends one and the same posture to whom it has heard, and keeps what it gets."""
+
+    def __init__(self, report: RobotReport) -> None:
+        here, listen = Address(HOST, free_port()), Address(HOST, free_port())
+        self._port = UdpPort(here)
+        self._listener: Address | None = None
+        self._report, self._over = report, threading.Event()
+        self.commands: list[MotorTargets] = []
+        self.keys = {
+            "team.robots": 1,
+            "team.plant": "robots",
+            "team.plants": "each",
+            "world.mode": "realtime",
+            "bridge.endpoint": f"{HOST}:{here.port}",
+            "bridge.listen": f"{HOST}:{listen.port}",
+            "bridge.report_share": 0.05,
+        }
+        self._thread = threading.Thread(target=self._run)
+        self._thread.start()
+
+    def _run(self) -> None:
+        tick = 0
+        while not self._over.is_set():
+            tick += 1
+            self._port.send(A1.encode_report(replace(self._report, tick=tick)), self._listener)
+            for packet, sender in self._port.drain():
+                self.commands.append(A1.decode_command(packet))
+                self._listener = sender
+            sleep(0.0003)  # rather too many than too few
+
+    def close(self) -> None:
+        self._over.set()
+        self._thread.join()
+        self._port.close()
+
+
+@pytest.fixture
+def board() -> Iterator[Board]:
+    made = Board(standing(config_of(), q=config_of().robot.q_lying))
+    yield made
+    made.close()
+
+
+@contextmanager
+def bridge_to(board: Board, said: list[str], *, armed: bool = False) -> Iterator[RobotPlant]:
+    config = load(overrides=board.keys)
+    driver = open_driver("a1", config.bridge)
+    watchdog = Watchdog("a1", config.bridge) if armed else None
+    plant = RobotPlant(config, "r1", driver, watchdog=watchdog, say=said.append)
+    try:
+        yield plant
+    finally:
+        plant.finish()
+
+
+def test_a_dry_run_enables_no_motor_whatever_the_agent_asks_for(board: Board) -> None:
+    """Its robot says nothing before it has had a packet: it gets one, and no other."""
+    said: list[str] = []
+    command = Command(0, 0, *np.full((5, 12), 3.0))
+    states = 0
+    with bridge_to(board, said) as plant:
+        assert plant.prepare(lambda: False)
+        for _ in range(200):
+            states += len(plant.states())
+            plant.step({"r1": command})
+            sleep(0.001)
+    assert [set(command.mode.tolist()) for command in board.commands] == [{OFF}]
+    assert plant.mode is BridgeMode.DRY
+    assert states > 50
+    assert "r1: dry run, no motor is enabled; --armed commands the robot" in said
+
+
+def test_a_hot_motor_is_told_of_once_a_minute_and_recorded() -> None:
+    config, said = config_of("go2"), list[str]()
+    report = standing(config, temperature=np.where(np.arange(12) == 2, 82.0, 40.0))
+    driver: Any = SimpleNamespace(
+        servo=SERVO, period_ms=1, receive=lambda: report, other_writers=lambda: 0
+    )
+    plant = RobotPlant(config, "r1", driver, watchdog=None, say=said.append)
+    for _ in range(3000):
+        plant.turn(Request.REST)
+    assert said == ["r1: dry hot:FL_calf_joint 82 °C, 88 °C stop it"]
+    assert [reason for _, _, reason in plant._untold] == ["hot:FL_calf_joint 82 °C, 88 °C stop it"]
+
+
+def test_a_robot_that_is_not_as_it_must_be_gets_no_command() -> None:
+    """This one reports that it lies on its back, and its bridge looks before its team is there."""
+    lying = standing(config_of(), quat_wxyz=tilted(3.1), accel=np.array([0.0, 0.0, -9.81]))
+    board = Board(lying)
+    try:
+        with pytest.raises(CheckError, match=r"robot r1: posture: got tilted by 3\.10 rad"):
+            build_bridge(load(overrides=board.keys), ("r1",), armed=True)
+    finally:
+        board.close()
+    assert [set(command.mode.tolist()) for command in board.commands] == [{OFF}]
+
+
+def test_a_bridge_that_was_silent_learns_at_once_that_its_watchdog_has_acted() -> None:
+    watchdog = Watchdog("a1", replace(config_of().bridge, damp_ms=20, passive_s=0.5))
+    assert watchdog.beat()
+    sleep(0.2)
+    assert not watchdog.beat()
+    assert watchdog._process.poll() is None, "it damps the motors"
+    watchdog.dismiss()
+
+
+class Script(RobotDriver):
+    """A driver whose robot speaks at given milliseconds of the bridge."""
+
+    servo, packets_ms = SERVO, 2
+
+    def __init__(self, speaks: Iterator[bool]) -> None:
+        super().__init__()
+        self._speaks, self.ms, self._spoken = speaks, 0, False
+
+    def pass_ms(self) -> None:
+        """Let a millisecond pass.
+
+        Raises:
+            StopIteration: the script is at its end.
+        """
+        self.ms, self._spoken = self.ms + 1, next(self._speaks) or self._spoken
+
+    def receive(self) -> RobotReport | None:
+        spoken, self._spoken = self._spoken, False
+        return standing(config_of(), tick=self.ms) if spoken else None
+
+    def send(self, targets: MotorTargets) -> None:
+        raise AssertionError("a dry run")
+
+    def close(self) -> None: ...
+
+
+def ticks_of(speaks: Iterable[bool]) -> list[int]:
+    """Ticks of the states of a robot that speaks so."""
+    script = Script(iter(speaks))
+    plant = RobotPlant(config_of(), "r1", script, watchdog=None, say=list[str]().append)
+    ticks = []
+    with suppress(StopIteration):
+        while True:
+            ticks += [state.tick for state in plant.states().values()]
+            script.pass_ms()
+            plant.step({})
+    return ticks
+
+
+def test_states_have_even_ticks_and_each_sample_has_one() -> None:
+    assert ticks_of(k % 2 == 0 for k in range(40)) == list(range(2, 41, 2))
+    late = [True, *[False] * 4, True, *[False] * 10]
+    assert ticks_of(late * 3) == [2, 6, 10, 18, 20, 22, 34, 38, 40]
+
+
+def test_at_a_sample_without_anything_new_the_last_report_counts_unless_it_is_old() -> None:
+    last_at_six = [k == 5 for k in range(25)]
+    assert ticks_of(last_at_six) == [6, 10]
+    last_at_four = [k == 3 for k in range(25)]
+    assert ticks_of(last_at_four) == [4]
+
+
+def test_how_often_the_counts_of_a_real_go1_change_is_reported() -> None:
+    rows = iter(real_go1_counts())
+
+    class Go1(Script):
+        def receive(self) -> RobotReport | None:
+            report = super().receive()
+            return report and replace(report, foot=next(rows))
+
+    script = Go1(iter([True, False] * 1100))
+    plant = RobotPlant(
+        config_of("go1"), "r1", script, watchdog=None, say=print, clock=lambda: script.ms * 1e-3
+    )
+    with suppress(StopIteration):
+        while True:
+            plant.states()
+            script.pass_ms()
+            plant.step({})
+    counters = plant.describe(Status(0, 0, "", "", "", {}, {}, np.empty(0), np.empty(0))).counters
+    assert counters["foot_refresh_hz"] in (49, 50, 51)
+
+
+def test_headings_count_from_where_the_robot_starts() -> None:
+    config: Config = config_of()
+    turned = np.array([np.cos(0.7), 0.0, 0.0, np.sin(0.7)])
+    report = standing(config, quat_wxyz=turned)
+    yaw = yaw_of(turned)
+    assert yaw == pytest.approx(1.4)
+    np.testing.assert_allclose(to_state(report, 4, yaw).imu_quat_wxyz, [1, 0, 0, 0], atol=1e-12)
+    rolled = to_state(replace(report, quat_wxyz=tilted(0.3)), 4, 0.0)
+    np.testing.assert_allclose(rolled.imu_quat_wxyz, tilted(0.3))

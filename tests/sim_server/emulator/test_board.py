@@ -1,0 +1,207 @@
+"""An emulated A1 and what befalls its network, as a bridge's driver sees it over real sockets."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from quadriga.bridges.drivers import UdpDriver
+from quadriga.bridges.plant import bridge_of
+from quadriga.shared.config.bridge import BridgeConfig
+from quadriga.shared.config.load import load
+from quadriga.shared.errors import BridgeError, ConfigError
+from quadriga.shared.robot.conventions import JOINT_NAMES
+from quadriga.shared.unitree.codecs import A1
+from quadriga.shared.unitree.packets import NO_ANGLE, NO_RATE, OFF, PROTECTED, SERVO, RobotReport
+from quadriga.shared.unitree.udp import Address
+from quadriga.shared.wire.messages import Command
+from quadriga.sim_server.emulator.board import RobotStatus, UdpBoard, open_boards
+from quadriga.sim_server.emulator.link import LinkFaults
+from quadriga.sim_server.world.world import World
+from tests.bridges.robots import config_of, holding
+from tests.bridges.test_udp_driver import HOST, free_port
+
+STATE = World(load(overrides={"team.robots": 1})).states()["r1"]
+COLD = np.zeros(12)
+DRIVING = holding(config_of(), tau=np.arange(12.0))
+
+
+class Bench:
+    """A robot and a bridge's driver, a millisecond at a time."""
+
+    def __init__(self) -> None:
+        robot, listen = Address(HOST, free_port()), Address(HOST, free_port())
+        self.robot = UdpBoard(A1, robot, seed=(5,))
+        self.driver = UdpDriver("a1", BridgeConfig(f"{HOST}:{robot.port}", f"{HOST}:{listen.port}"))
+        self.now = 0
+        self.command: Command | None = None
+
+    def tick(self, *, send: bool = False) -> RobotReport | None:
+        """The robot reports, the bridge receives and may send, the robot obeys."""
+        self.robot.report(replace(STATE, tick=self.now), COLD + 0.5)
+        report = self.driver.receive()
+        if send:
+            self.driver.send(DRIVING)
+        self.command = self.robot.obey()
+        self.now += 1
+        return report
+
+    def ticks(self, n: int, *, send: bool = False) -> int:
+        """So many milliseconds; in how many a report came."""
+        return sum(self.tick(send=send) is not None for _ in range(n))
+
+
+@pytest.fixture
+def silent() -> Iterator[Bench]:
+    made = Bench()
+    yield made
+    made.driver.close()
+    made.robot.close()
+
+
+@pytest.fixture
+def bench(silent: Bench) -> Bench:
+    """One that has had a packet, and so reports."""
+    silent.driver.introduce()
+    silent.robot.obey()
+    silent.robot.received = 0
+    return silent
+
+
+def test_it_reports_what_its_sensors_measure_once_it_has_heard(silent: Bench) -> None:
+    assert silent.ticks(5) == 0
+    silent.driver.introduce()
+    assert silent.tick() is None
+    assert silent.command is None, "that enables no motor"
+    report = silent.tick()
+    assert report is not None
+    np.testing.assert_allclose(report.q, STATE.q_joint, atol=1e-6)
+    np.testing.assert_allclose(report.accel, STATE.imu_accel, atol=1e-5)
+    np.testing.assert_allclose(report.quat_wxyz, STATE.imu_quat_wxyz, atol=1e-6)
+    np.testing.assert_allclose(report.foot, np.rint(STATE.foot_force))
+    np.testing.assert_allclose(report.temperature, 50.0)
+
+
+def test_it_obeys_the_last_command_until_another_comes(bench: Bench) -> None:
+    bench.tick(send=True)
+    bench.ticks(100)  # it has no watchdog
+    assert bench.command is not None
+    np.testing.assert_allclose(bench.command.tau, np.arange(12.0))
+    bench.driver.send(replace(DRIVING, mode=np.full(12, OFF, np.uint8)))
+    bench.tick()
+    assert bench.command is None
+
+
+@pytest.mark.parametrize(
+    ("inwards", "outwards", "reports", "commands"),
+    [
+        (LinkFaults(loss=1.0), LinkFaults(), 20, 0),
+        (LinkFaults(), LinkFaults(loss=1.0), 0, 20),
+        (LinkFaults(delay=5.0), LinkFaults(delay=5.0), 15, 15),
+    ],
+)
+def test_packets_are_lost_and_late_each_way(
+    bench: Bench, inwards: LinkFaults, outwards: LinkFaults, reports: int, commands: int
+) -> None:
+    bench.robot.inwards.faults, bench.robot.outwards.faults = inwards, outwards
+    assert bench.ticks(20, send=True) == reports
+    assert bench.robot.received == commands
+
+
+@pytest.mark.parametrize(
+    ("faults", "counter", "count"),
+    [
+        (LinkFaults(duplicate=1.0), "repeated", 10),
+        (LinkFaults(reorder=1.0), "older", 5),
+        (LinkFaults(garbage=1.0), "malformed", 10),
+    ],
+)
+def test_damage_is_what_the_driver_counts(
+    bench: Bench, faults: LinkFaults, counter: str, count: int
+) -> None:
+    bench.robot.inwards.faults = bench.robot.outwards.faults = faults
+    bench.ticks(10, send=True)
+    assert bench.driver.counters[counter] == count
+    assert bench.robot.malformed == (count if counter == "malformed" else 0)
+
+
+def test_two_writers_take_turns_at_the_motors_until_one_leaves(bench: Bench) -> None:
+    bench.robot.add_second_writer()
+    bench.robot.add_second_writer()  # one is enough
+    driven = 0
+    for _ in range(200):
+        bench.tick(send=True)
+        assert bench.command is not None
+        driven += bool(bench.command.kp.any())
+    assert 50 < driven < 150
+    bench.ticks(10)
+    assert bench.command is not None
+    assert not bench.command.kp.any()
+    assert not bench.command.tau.any()
+    np.testing.assert_array_equal(bench.command.kd, 2.0)
+    bench.robot.clear()
+    bench.tick(send=True)
+    assert bench.ticks(10) == 10
+
+
+def test_all_is_well_again_when_it_is_cleared(bench: Bench) -> None:
+    bench.robot.inwards.faults = bench.robot.outwards.faults = LinkFaults(0.5, 0.5, 0.5, 0.5)
+    bench.robot.status.charge = 8.0
+    bench.robot.status.protected.add(3)
+    bench.ticks(20, send=True)
+    bench.robot.clear()
+    bench.tick(send=True)
+    assert bench.ticks(20, send=True) == 20
+    assert bench.robot.status.charge == 80.0
+    assert bench.command is not None
+    assert bench.command.kp.all()
+
+
+def test_a_motor_in_protection_mode_says_so_and_gives_nothing() -> None:
+    joint = JOINT_NAMES.index("FR_calf_joint")
+    status, targets = RobotStatus(protected={joint}), holding(config_of(), tau=np.ones(12))
+    mode = status.report(STATE, COLD, targets).mode
+    assert mode[joint] == PROTECTED
+    assert set(np.delete(mode, joint).tolist()) == {SERVO}
+    assert targets.mode[joint] == SERVO, "the command itself is left alone"
+    command = status.command(targets)
+    assert command is not None
+    for values in (command.tau, command.kp, command.kd):
+        assert values[joint] == 0.0
+        assert np.delete(values, joint).all()
+
+
+def test_what_is_not_asked_for_is_not_an_angle() -> None:
+    nothing = {"q": np.full(12, NO_ANGLE), "dq": np.full(12, NO_RATE)}
+    free = holding(config_of(), kp=COLD, kd=COLD, tau=np.ones(12), **nothing)
+    command = RobotStatus().command(free)
+    assert command is not None
+    np.testing.assert_array_equal([command.q_des, command.v_des], 0.0)
+
+
+def test_each_robot_may_have_a_network_of_its_own_and_then_domain_0_like_a_real_one() -> None:
+    keys = {"team.robot": "go2", "team.robots": 2}
+    config = load(overrides={**keys, "bridge.interface": "nowhere{number}"})
+    ways = [bridge_of(config, name) for name in ("r1", "r2")]
+    assert [(way.interface, way.domain) for way in ways] == [("nowhere1", 0), ("nowhere2", 0)]
+    with pytest.raises(BridgeError, match="DDS domain 0 on 'nowhere1'"):
+        open_boards(config)
+    config = load(overrides={**keys, "bridge.interface": "lo", "bridge.domain": 186})
+    ways = [bridge_of(config, name) for name in ("r1", "r2")]
+    assert [(way.interface, way.domain) for way in ways] == [("lo", 186), ("lo", 187)]
+
+
+def test_what_is_open_is_closed_if_another_cannot_be_opened() -> None:
+    port = free_port()
+    keys = {"team.robots": 2, "bridge.endpoint": f"{HOST}:{port}"}  # the same for both
+    for _ in range(2):  # the first robot's port is free again
+        with pytest.raises(BridgeError, match=f"UDP port {port} of {HOST}"):
+            open_boards(load(overrides=keys))
+
+
+def test_robots_without_an_address_of_their_own_are_refused() -> None:
+    with pytest.raises(ConfigError, match=r"bridge\.endpoint"):
+        open_boards(load(overrides={"team.robots": 1}))
