@@ -37,13 +37,15 @@ _FASTEST: Final = 20.0  # rad/s, of joints: where readings are missing, more may
 _BEYOND: Final = 0.3  # rad beyond an end stop; encoders have an error of their zero
 _QUAT_NORM2: Final = (0.5, 2.0)  # |q|² of an attitude
 _ACCEL_MAX: Final = 150.0  # m/s²: accelerometers of such robots end at 16 g
-_UP_TIME: Final = 0.01  # s, time constant of the force that holds the trunk against gravity
-_UP_LEAST: Final = -3.0  # m/s²; nothing pulls a trunk down by so much for so long
+_UP_TIME: Final = 0.015  # s, time constant of the force that holds the trunk against gravity
+_UP_LEAST: Final = -6.0  # m/s²; a trunk that is thrown over is pulled down by less
 _TURNS: Final = 1e-3  # rad/s, of a gyro that says that the trunk moves
 _SAME_MS: Final = 20.0  # for which an IMU may read the same: it may be slower than the ticks
 _LEAD_MS: Final = 200.0  # from where the joints are to the stand: a swinging foot is soon down
 
-_IMU: Final = N_JOINTS  # index of the IMU behind the joints' encoders
+_IMU: Final = N_JOINTS  # index of attitude and gyro behind the joints' encoders
+_FORCE: Final = N_JOINTS + 1  # of the accelerometer, which alone no robot needs to walk
+_N_SENSORS: Final = N_JOINTS + 2
 _Q, _V = State.CUTS["q_joint"], State.CUTS["v_joint"]
 _QUAT, _GYRO = State.CUTS["imu_quat_wxyz"], State.CUTS["imu_gyro"]
 _ACCEL: Final = State.CUTS["imu_accel"]
@@ -56,8 +58,9 @@ class ValidationLayout(NamedTuple):
     Attributes:
         read: the last state, as it was read, `State.row`.
         valid: the last valid readings, likewise.
-        agrees: for how long each encoder, and the IMU, has agreed with itself, (13,), ms.
-        missing: for how long each has not been valid, (13,), ms.
+        agrees: for how long each encoder, attitude with gyro, and the accelerometer have agreed
+            with themselves, (14,), ms.
+        missing: for how long each has not been valid, (14,), ms.
         same: for how long the IMU has read the same, ms.
         up: specific force along the vertical by the IMU's own attitude, filtered, m/s².
     """
@@ -71,7 +74,7 @@ class ValidationLayout(NamedTuple):
 
 
 _ROW: Final = ValidationLayout(
-    **places(read=_N_STATE, valid=_N_STATE, agrees=N_JOINTS + 1, missing=N_JOINTS + 1, same=1, up=1)
+    **places(read=_N_STATE, valid=_N_STATE, agrees=_N_SENSORS, missing=_N_SENSORS, same=1, up=1)
 )
 
 
@@ -81,7 +84,7 @@ class Validated(NamedTuple):
     Attributes:
         memory: for the next tick, see `ValidationLayout`.
         state: what was read, with the last valid readings in place of invalid ones.
-        imu: whether the IMU's reading is invalid now.
+        imu: whether a reading of the IMU is invalid now.
         encoders: joints, of 0 … 11, whose encoder's reading is invalid now.
         lost: why the robot can walk no more; "": it can.
     """
@@ -130,14 +133,14 @@ class Validator:
             return Validated(memory, state, imu=False, encoders=(), lost="")
         missing = memory[_ROW.missing]
         invalid = np.flatnonzero(missing > 0.0).tolist()
-        encoders = tuple(joint for joint in invalid if joint != _IMU)
-        row = state.row.copy()
-        if missing[_IMU]:
-            _level(row, memory[_ROW.valid])
+        encoders = tuple(joint for joint in invalid if joint < N_JOINTS)
+        imu, row = len(encoders) < len(invalid), state.row.copy()
+        if imu:
+            _replace_imu(row, memory[_ROW.valid], missing[_IMU] > 0.0)
         for joint in encoders:
             row[_Q][joint], row[_V][joint] = memory[_ROW.valid][_Q][joint], 0.0
         valid = State.from_row(state.tick, state.stamp_ns, row)
-        return Validated(memory, valid, bool(missing[_IMU]), encoders, self._loss(missing))
+        return Validated(memory, valid, imu, encoders, self._loss(missing))
 
     def _loss(self, missing: Array) -> str:
         """Why the robot can walk no more; "": it can."""
@@ -204,9 +207,11 @@ def _validate(memory: Array, state: Array, lower: Array, upper: Array, dt: float
     agrees, missing = memory[_ROW.agrees], memory[_ROW.missing]
     resumed, whole = dt > _PAUSE, True
     jump = _JUMP + _FASTEST * max(0.0, dt - 1e-3)
-    for index in range(N_JOINTS + 1):
+    for index in range(_N_SENSORS):
         if index == _IMU:
-            sound = _is_sound_imu(memory, state, dt, resumed)
+            sound = _is_sound_attitude(memory, state, dt, resumed)
+        elif index == _FORCE:
+            sound = 0.0 < np.max(np.abs(state[_ACCEL])) < _ACCEL_MAX
         else:
             q, v, q0, v0 = state[_Q][index], state[_V][index], last[_Q][index], last[_V][index]
             follows = abs(q - q0 - 0.5 * dt * (v + v0)) <= jump
@@ -221,15 +226,15 @@ def _validate(memory: Array, state: Array, lower: Array, upper: Array, dt: float
         missing[index] = 0.0
         if index == _IMU:
             valid[_QUAT] = state[_QUAT]
-        else:
+        elif index < N_JOINTS:
             valid[_Q][index] = state[_Q][index]
     last[:] = state
     return whole
 
 
 @compiled
-def _is_sound_imu(memory: Array, state: Array, dt: float, resumed: bool) -> bool:
-    """Whether an IMU says what can be, and what follows from what it said before."""
+def _is_sound_attitude(memory: Array, state: Array, dt: float, resumed: bool) -> bool:
+    """Whether attitude and gyro can be, and follow from what they were before."""
     last, quat, gyro, accel = memory[_ROW.read], state[_QUAT], state[_GYRO], state[_ACCEL]
     same = True
     for index in range(_QUAT.start, _ACCEL.stop):
@@ -237,12 +242,11 @@ def _is_sound_imu(memory: Array, state: Array, dt: float, resumed: bool) -> bool
     memory[_ROW.same] = memory[_ROW.same] + 1e3 * dt if same else 0.0
     if memory[_ROW.same] >= _SAME_MS and np.max(np.abs(gyro)) > _TURNS:
         return False
-    if not (np.isfinite(np.sum(gyro)) and 0.0 < np.max(np.abs(accel)) < _ACCEL_MAX):
+    if not (np.isfinite(np.sum(gyro)) and _is_attitude(quat)):
         return False
-    if not _is_attitude(quat):
-        return False
-    up = np.sum(_vertical(quat) * accel)
-    memory[_ROW.up] += dt / (_UP_TIME + dt) * (up - memory[_ROW.up])
+    if 0.0 < np.max(np.abs(accel)) < _ACCEL_MAX:
+        up = np.sum(_vertical(quat) * accel)
+        memory[_ROW.up] += dt / (_UP_TIME + dt) * (up - memory[_ROW.up])
     doubted = memory[_ROW.missing][_IMU] > 0.0  # one that falls freely feels hardly anything
     if memory[_ROW.up] < (-_UP_LEAST if doubted else _UP_LEAST):
         return False
@@ -269,11 +273,12 @@ def _is_attitude(quat_wxyz: Array) -> bool:
 
 
 @compiled
-def _level(row: Array, valid: Array) -> None:
-    """Put the last valid attitude into a state, at rest: gravity alone acts."""
-    row[_QUAT] = valid[_QUAT] / np.sqrt(np.sum(valid[_QUAT] * valid[_QUAT]))
-    row[_GYRO] = 0.0
-    row[_ACCEL] = GRAVITY * _vertical(valid[_QUAT])
+def _replace_imu(row: Array, valid: Array, attitude: bool) -> None:
+    """Let gravity alone act in a state, and put the last valid `attitude` into it, at rest."""
+    if attitude:
+        row[_QUAT] = valid[_QUAT] / np.sqrt(np.sum(valid[_QUAT] * valid[_QUAT]))
+        row[_GYRO] = 0.0
+    row[_ACCEL] = GRAVITY * _vertical(row[_QUAT])
 
 
 @compiled
