@@ -3,7 +3,8 @@
 The plant of all robots has nobody to ask. Where each robot has a plant of its own, that of the
 first robot drives time. In lock-step no follower takes a tick before the clock has come to its
 end, and the clock waits for every state and command of a tick: so the team ends as one, and what
-is recorded does not depend on who was faster. In real time ticks begin by `plant.team_clock`.
+is recorded does not depend on who was faster. In real time ticks begin by the system clocks, see
+`plant.pace`, and a plant whose messages are too old is given up.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from quadriga.shared.wire.messages import Clock, Event
 from quadriga.shared.wire.topics import CLOCK, COMMAND, EVENT, STATE
 
 _LOOKS: Final = 10  # in real time one each sample, until a plant that is not there is given up
-_JUMP_MS: Final = 5000  # no clock of a team that still walks is so far ahead
+_JUMP_MS: Final = 5000  # no plant of a team that still walks is so far ahead
 
 
 class TeamTime:
@@ -51,6 +52,10 @@ class TeamTime:
         """Plants without which this one may not take `tick` in lock-step."""
         return frozenset()
 
+    def silent(self, oldest: int) -> frozenset[str]:
+        """Plants on which this one depends, and whose newest message is of before tick `oldest`."""
+        return frozenset()
+
     def look(self, present: Collection[str]) -> None:
         """Set `end` if a plant on which this one depends is not among those `present`."""
 
@@ -71,13 +76,14 @@ class LeadTime(TeamTime):
         # By robot: how far it is, and its agent, −1 before the first message.
         self._reached, self._answered = dict.fromkeys(others, -1), dict.fromkeys(others, -1)
         self._silent: set[str] = set()
+        self._most_ahead = _JUMP_MS if config.world.mode == "realtime" else 0
 
     def take(self, key: str, payload: bytes, tick: int) -> None:
         if key == self._event:
             self._take_event(payload)
             return
         head = envelope(payload)
-        if head is None or head[0] > tick:  # nobody is ahead of who drives time
+        if head is None or head[0] > tick + self._most_ahead:
             return
         newest = self._reached if key in self._states else self._answered
         robot = (self._states if key in self._states else self._commands)[key]
@@ -88,6 +94,8 @@ class LeadTime(TeamTime):
             event = decode(payload, Event)
         except MessageError:
             return
+        if event.code == codes.CLOCK_SET:
+            self.end = self.end or End(event.code, event.detail)
         if event.robot not in self._reached:
             return
         if event.code in codes.DOWN:
@@ -103,6 +111,9 @@ class LeadTime(TeamTime):
             for name, reached in self._reached.items()
             if reached < tick or (self._answered[name] < tick and name not in self._silent)
         )
+
+    def silent(self, oldest: int) -> frozenset[str]:
+        return frozenset(plant_name(name) for name, at in self._reached.items() if at < oldest)
 
     def look(self, present: Collection[str]) -> None:
         gone = [plant_name(n) for n in self._reached if plant_name(n) not in present]
@@ -138,7 +149,10 @@ class FollowerTime(TeamTime):
             self._now = now
 
     def awaited(self, tick: int) -> frozenset[str]:
-        return self._lead if self._now <= tick else frozenset()
+        return self.silent(tick + 1)
+
+    def silent(self, oldest: int) -> frozenset[str]:
+        return self._lead if self._now < oldest else frozenset()
 
     def look(self, present: Collection[str]) -> None:
         if has_lead(present):

@@ -184,13 +184,12 @@ def test_a_frozen_plant_stops_the_team_and_is_named(make_team: Make) -> None:
 
 @pytest.mark.parametrize(("frozen", "other"), [(1, 2), (2, 1)])
 def test_a_frozen_plant_is_missed_in_real_time_whoever_leads(
-    puppets: Make, frozen: int, other: int
+    puppets: Make, watcher: Watcher, frozen: int, other: int
 ) -> None:
     """Robots of the others lie down; an arm's length of silence is enough."""
     team = puppets(world__seconds=FOREVER, bus__clock_timeout=2.0, **EACH, **REALTIME)
     with team.launch() as running:
-        team.await_log("plant_r2", "clock of plant_r1: known to")
-        sleep(1.0)
+        await_clock(watcher(team), 100)
         pid = running.pids[f"plant_r{frozen}"]
         os.kill(pid, signal.SIGSTOP)
         team.await_log(
