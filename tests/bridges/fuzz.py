@@ -21,7 +21,7 @@ from quadriga.bridges.modes import BridgeMode, Wish
 from quadriga.bridges.robot_plant import to_state
 from quadriga.bridges.supervisor import Supervisor, SupervisorInputs, SupervisorState
 from quadriga.bridges.udp_driver import UdpDriver
-from quadriga.plant.command_limits import MOST_KD, MOST_KP
+from quadriga.plant.commands import MOST_KD, MOST_KP
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
 from quadriga.shared.runtime.clock import monotonic
