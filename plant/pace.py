@@ -81,7 +81,7 @@ class TeamPace:
         self._bus, self._config, self._me = bus, config, me
         self._lead = "" if bus.name in LEADS else lead(config)
         self._clock, self._start = SystemClock(0), 0
-        self._tick = self._begun = self.overruns = 0
+        self._tick = self._ask_at = self._begun = self.overruns = 0
         self.offset: ClockOffset | None = None
         self._question: Answers | None = None
         self._is_off = False
@@ -168,7 +168,8 @@ class TeamPace:
             if question and about is not None:
                 answer = MemberAnswer(about, question.asked_ns, arrived)
                 self.offset = _SAME - answer.clock_offset
-        if self._tick % _ASK_TICKS == 0:
+        if self._tick >= self._ask_at:
+            self._ask_at = self._tick + _ASK_TICKS
             self._question = self._bus.ask(ABOUT.key(self._bus.team, self._lead), _ASK_S)
 
     def news(self) -> str:
