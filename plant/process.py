@@ -31,6 +31,22 @@ from quadriga.shared.wire.topics import COMMAND
 
 _PAUSE: Final = 0.002  # s, between two looks of a simulated robot's plant that waits
 
+# What was expected, and what the cause may be, by the code of an end.
+_BAD_ENDS: Final = {
+    codes.PLANT_FAILED: (
+        "a simulation that stays bounded",
+        "gains, loads, pushes or faults that no simulation follows",
+    ),
+    codes.CLOCK_SET: (
+        "a system clock that nobody sets during a walk",
+        "let PTP or chrony set it before; or the computer was suspended",
+    ),
+    codes.PLANT_GONE: (
+        "the plants of all robots until the end",
+        "it failed, was stopped, or lost its link: see what it says itself",
+    ),
+}
+
 PlantFactory = Callable[[Config, tuple[str, ...]], Plant]
 
 
@@ -128,24 +144,5 @@ def _check_end(end: End | None, team: str, tick: int) -> None:
         return
     if end.code == codes.LINK_LOST:
         raise loss_error(Loss(*end), tick)
-    if end.code == codes.PLANT_FAILED:
-        raise ProcessError(
-            f"team {team!r} at {tick} ms",
-            end.detail,
-            "a simulation that stays bounded",
-            "gains, loads, pushes or faults that no simulation follows",
-        )
-    if end.code == codes.CLOCK_SET:
-        raise ProcessError(
-            f"team {team!r} at {tick} ms",
-            end.detail,
-            "a system clock that nobody sets during a walk",
-            "let PTP or chrony set it before; or the computer was suspended",
-        )
-    if end.code == codes.PLANT_GONE:
-        raise ProcessError(
-            f"team {team!r}",
-            end.detail,
-            "the plants of all robots until the end",
-            "it failed, was stopped, or lost its link: see what it says itself",
-        )
+    if end.code in _BAD_ENDS:
+        raise ProcessError(f"team {team!r} at {tick} ms", end.detail, *_BAD_ENDS[end.code])

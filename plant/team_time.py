@@ -52,7 +52,7 @@ class TeamTime:
         """Plants without which this one may not take `tick` in lock-step."""
         return frozenset()
 
-    def silent(self, oldest: int) -> frozenset[str]:
+    def behind(self, oldest: int) -> frozenset[str]:
         """Plants on which this one depends, and whose newest message is of before tick `oldest`."""
         return frozenset()
 
@@ -67,27 +67,21 @@ class LeadTime(TeamTime):
 
     def __init__(self, config: Config, robot: str) -> None:
         super().__init__()
-        team = config.team.name
-        others = [name for name in robot_names(config.team.robots) if name != robot]
-        self._states = {STATE.key(team, name): name for name in others}
-        self._commands = {COMMAND.key(team, name): name for name in others}
-        self._event = EVENT.key(team)
-        self.keys = frozenset({*self._states, *self._commands, self._event})
-        # By robot: how far it is, and its agent, −1 before the first message.
-        self._reached, self._answered = dict.fromkeys(others, -1), dict.fromkeys(others, -1)
+        team, self._event = config.team.name, EVENT.key(config.team.name)
+        names = [name for name in robot_names(config.team.robots) if name != robot]
+        # By robot the keys of its plant and of its agent, and by key the newest tick, −1 at first.
+        self._others = {name: (STATE.key(team, name), COMMAND.key(team, name)) for name in names}
+        self._newest = {key: -1 for keys in self._others.values() for key in keys}
+        self.keys = frozenset({*self._newest, self._event})
         self._silent: set[str] = set()
         self._most_ahead = _JUMP_MS if config.world.mode == "realtime" else 0
 
     def take(self, key: str, payload: bytes, tick: int) -> None:
+        head = envelope(payload)
         if key == self._event:
             self._take_event(payload)
-            return
-        head = envelope(payload)
-        if head is None or head[0] > tick + self._most_ahead:
-            return
-        newest = self._reached if key in self._states else self._answered
-        robot = (self._states if key in self._states else self._commands)[key]
-        newest[robot] = max(newest[robot], head[0])
+        elif head is not None and head[0] <= tick + self._most_ahead:
+            self._newest[key] = max(self._newest[key], head[0])
 
     def _take_event(self, payload: bytes) -> None:
         try:
@@ -96,7 +90,7 @@ class LeadTime(TeamTime):
             return
         if event.code == codes.CLOCK_SET:
             self.end = self.end or End(event.code, event.detail)
-        if event.robot not in self._reached:
+        if event.robot not in self._others:
             return
         if event.code in codes.DOWN:
             self.falls.append(event)
@@ -106,17 +100,19 @@ class LeadTime(TeamTime):
             self._silent.discard(event.robot)
 
     def awaited(self, tick: int) -> frozenset[str]:
-        return frozenset(
+        unanswered = (
             plant_name(name)
-            for name, reached in self._reached.items()
-            if reached < tick or (self._answered[name] < tick and name not in self._silent)
+            for name, (_, command) in self._others.items()
+            if self._newest[command] < tick and name not in self._silent
         )
+        return self.behind(tick).union(unanswered)
 
-    def silent(self, oldest: int) -> frozenset[str]:
-        return frozenset(plant_name(name) for name, at in self._reached.items() if at < oldest)
+    def behind(self, oldest: int) -> frozenset[str]:
+        found = (n for n, (state, _) in self._others.items() if self._newest[state] < oldest)
+        return frozenset(map(plant_name, found))
 
     def look(self, present: Collection[str]) -> None:
-        gone = [plant_name(n) for n in self._reached if plant_name(n) not in present]
+        gone = [plant for plant in map(plant_name, self._others) if plant not in present]
         if gone and self.end is None:
             self.end = plant_gone(gone, "gone")
 
@@ -149,9 +145,9 @@ class FollowerTime(TeamTime):
             self._now = now
 
     def awaited(self, tick: int) -> frozenset[str]:
-        return self.silent(tick + 1)
+        return self.behind(tick + 1)
 
-    def silent(self, oldest: int) -> frozenset[str]:
+    def behind(self, oldest: int) -> frozenset[str]:
         return self._lead if self._now < oldest else frozenset()
 
     def look(self, present: Collection[str]) -> None:

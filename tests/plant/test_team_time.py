@@ -112,8 +112,8 @@ def test_in_real_time_a_plant_is_silent_whose_newest_message_is_too_old(robot: s
     )
     time.take(topic, said(700), 690)
     time.take(topic, said(9999), 700)
-    assert not time.silent(700), "it may be ahead, of one that was late, but not by seconds"
-    assert time.silent(701) == {other}
+    assert not time.behind(700), "it may be ahead, of one that was late, but not by seconds"
+    assert time.behind(701) == {other}
 
 
 def test_all_leave_when_the_system_clock_of_one_was_set(config: Config) -> None:
