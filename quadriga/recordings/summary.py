@@ -212,12 +212,16 @@ def _deadlines(traces: Traces) -> dict[str, Any]:
 
 
 def _clock(statuses: Sequence[Status]) -> dict[str, Any] | None:
-    """How far a plant's system clock was off, ms; None of one that none was compared with."""
+    """By how much a plant's system clock was off for sure, ms; None of one that leads or is alone.
+
+    Of all comparisons it is that which shows most: whose offset exceeds its error by most.
+    """
     ages = [status.ages_ms for status in statuses if "clock.offset" in status.ages_ms]
-    if not ages:
+    found = [(abs(age["clock.offset"]), age["clock.error"]) for age in ages]
+    if not found:
         return None
-    offset, error = max((abs(age["clock.offset"]), age["clock.error"]) for age in ages)
-    return {"offset_ms_max": offset, "error_ms": error}
+    offset, error = max(found, key=lambda pair: pair[0] - pair[1])
+    return {"offset_ms": offset, "error_ms": error}
 
 
 def _spread(status: Status, name: str) -> dict[str, float]:

@@ -81,8 +81,8 @@ def _list_lateness(realtime: Mapping[str, Any] | None) -> list[tuple[str, str]]:
             text += f"{age}; {jitter}"
         shown.append((f"{name} late", text))
         if figures.get("clock"):
-            offset, error = figures["clock"]["offset_ms_max"], figures["clock"]["error_ms"]
-            shown.append((f"{name} clock", f"off by at most {offset:.2f} ± {error:.2f} ms"))
+            offset, error = figures["clock"]["offset_ms"], figures["clock"]["error_ms"]
+            shown.append((f"{name} clock", f"off by {offset:.2f} ± {error:.2f} ms"))
     return shown
 
 
