@@ -143,15 +143,6 @@ def _world(part: Part) -> list[str]:
     return [f"a step: {', '.join(rows)}"]
 
 
-def _clock(part: Part) -> list[str]:
-    return [
-        f"two plants, clocks {row['clocks']}, {row['busy']} busy processes, {row['priority']}: a "
-        f"tick begins {row['median_us']:.0f} µs apart, p99 {row['p99_us']:.0f}, at most "
-        f"{row['max_us']:.0f}; stated error ≤ {row['stated_us']:.0f} µs"
-        for row in part["rows"]
-    ]
-
-
 def _recorder(part: Part) -> list[str]:
     return [
         f"{part['per_s']:,.0f} messages/s of {part['asked_per_s']:,.0f} asked for, "
@@ -217,6 +208,6 @@ def _memory(figures: dict[str, dict[str, float]]) -> str:
 
 LINES: Final[dict[str, Callable[[Part], list[str]]]] = {
     "machine": _machine, "planner": _planner, "low-level": _low_level, "bus": _bus,
-    "world": _world, "clock": _clock, "recorder": _recorder, "fit": _fit, "start": _start,
+    "world": _world, "recorder": _recorder, "fit": _fit, "start": _start,
     "real-time": _realtime, "walks": _walks,
 }  # fmt: skip

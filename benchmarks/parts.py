@@ -72,18 +72,6 @@ def world(options: Options, _console: Console, tell: Tell) -> Part:
     return {"rows": rows}
 
 
-def clock(options: Options, _console: Console, tell: Tell) -> Part:
-    """How well plants of single robots keep the team's clock in real time."""
-    from benchmarks.clock import measure
-
-    cases = [(0, "realtime"), (4, "realtime"), (4, "ordinary")]
-    rows = []
-    for busy, priority in cases[:1] if options.quick else cases:
-        tell(f"{busy} busy processes, {priority}")
-        rows.append(measure(1.5 if options.quick else 20.0, busy, priority))
-    return {"rows": rows}
-
-
 def recorder(options: Options, _console: Console, _tell: Tell) -> Part:
     """The recorder's throughput."""
     from benchmarks.recorder import measure
@@ -198,6 +186,6 @@ def team(
 
 
 PARTS: dict[str, Callable[[Options, Console, Tell], Part]] = {
-    "planner": planner, "low-level": low_level, "bus": bus, "world": world, "clock": clock,
+    "planner": planner, "low-level": low_level, "bus": bus, "world": world,
     "recorder": recorder, "fit": fit, "start": start, "real-time": realtime, "walks": walks,
 }  # fmt: skip

@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quadriga.plant.command_limits import MOST_KD, MOST_KP
+from quadriga.plant.commands import MOST_KD, MOST_KP
 from quadriga.shared.config.bridge import BridgeConfig
 from quadriga.shared.robot.conventions import N_JOINTS, Array
 from quadriga.shared.robot.spec import RobotSpec

@@ -1,27 +1,67 @@
-"""Commands as they arrive at the world: decoded, checked, latest kept, the rest counted."""
+"""Commands as they arrive at the plant: decoded, checked, the newest kept, the rest counted.
+
+Every finite number passes the wire. A gain of 1e300 makes the sum that a motor forms infinite minus
+infinite, which is no number, and then the whole world that it moves is none. So none beyond the
+limits drives a robot, simulated or real. Whoever may publish on a robot's key can still command all
+that is within them.
+"""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from quadriga.plant.command_limits import command_limits, describe_excess
 from quadriga.shared.errors import MessageError
-from quadriga.shared.robot.conventions import N_JOINTS
+from quadriga.shared.robot.conventions import N_JOINTS, Array
 from quadriga.shared.robot.spec import RobotSpec
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.messages import Command
 from quadriga.shared.wire.topics import COMMAND
 
-MALFORMED: Final = "malformed"
-IMPLAUSIBLE: Final = "implausible"
-CONTRADICTED: Final = "contradicted"
-STALE: Final = "stale"
-FOREIGN: Final = "foreign"
-_INVALID: Final = (MALFORMED, IMPLAUSIBLE, CONTRADICTED)  # no process of this project sends such
+MOST_KP: Final = 500.0  # N·m/rad, stiffer than any of these robots' motors are run
+MOST_KD: Final = 30.0  # N·m·s/rad
+# What is asked for may exceed what the robot can do: motors and bridges cut that off.
+_TIMES: Final = 2.0  # times the greatest torque, and the greatest speed
+_BEYOND: Final = 1.0  # rad beyond the joint's range
+
+
+class CommandLimits(NamedTuple):
+    """Least and greatest numbers of a command's row, (60,) each."""
+
+    least: Array
+    most: Array
+
+
+def command_limits(robot: RobotSpec) -> CommandLimits:
+    """The limits of a kind of robot. Zeros, which damp nothing and hold nothing, are within."""
+    speed = np.tile(robot.speed, 4)
+    angle = np.maximum(np.abs(robot.lower), np.abs(robot.upper)) + _BEYOND
+    bounds = {
+        "tau": _TIMES * robot.torque_limit,
+        "q_des": angle,
+        "v_des": _TIMES * speed,
+        "kp": np.full_like(speed, MOST_KP),
+        "kd": np.full_like(speed, MOST_KD),
+    }
+    most = np.concatenate([bounds[name] for name in Command.CUTS])
+    least = -most
+    for gain in ("kp", "kd"):  # one below zero drives what it should hold
+        least[Command.CUTS[gain]] = 0.0
+    return CommandLimits(least, most)
+
+
+def describe_excess(command: Command, limits: CommandLimits) -> str:
+    """Which number of a command is beyond the limits, in words; "" if none is."""
+    beyond = (command.row < limits.least) | (command.row > limits.most)
+    if not beyond.any():
+        return ""
+    at = int(beyond.argmax())
+    name = next(name for name, cut in Command.CUTS.items() if at < cut.stop)
+    least, most = limits.least[at], limits.most[at]
+    return f"command.{name}: got {command.row[at]:g}, expected {least:g} … {most:g}"
 
 
 class CommandBox:
@@ -29,8 +69,6 @@ class CommandBox:
 
     Attributes:
         latest: by robot, in no particular order.
-        refused: number of refused messages by reason (`MALFORMED`, `IMPLAUSIBLE`, `CONTRADICTED`,
-            `STALE`, `FOREIGN`) and robot, "" for a robot of no or another team.
         errors: by robot, what was wrong with the latest that no process of this project sends.
     """
 
@@ -39,16 +77,15 @@ class CommandBox:
         self._robots = {COMMAND.key(team, name): name for name in names}
         self._limits = command_limits(robot)
         self.latest: dict[str, Command] = {}
-        self.refused: Counter[tuple[str, str]] = Counter()
         self.errors: dict[str, str] = {}
+        self._invalid: Counter[str] = Counter()
         self._whys: dict[str, str] = {}  # why each robot's latest command was refused
         # The first one read compiles or loads what reads it, which is not for the first tick.
-        first = decode(encode(Command(0, 0, *np.zeros((5, N_JOINTS)))), Command)
-        describe_excess(first, self._limits)
+        decode(encode(Command(0, 0, *np.zeros((5, N_JOINTS)))), Command)
 
     def invalid_of(self, robot: str) -> int:
         """Number of a robot's packets that were no valid command, or one that nobody can mean."""
-        return sum(self.refused[reason, robot] for reason in _INVALID)
+        return self._invalid[robot]
 
     def tick_of(self, robot: str) -> int:
         """Tick of the robot's newest command, −1 before the first."""
@@ -62,40 +99,37 @@ class CommandBox:
     def take(self, key: str, payload: bytes, tick: int, oldest: int) -> str:
         """Take in a packet; the robot's name if its command is now newer.
 
-        Refused are a command with numbers beyond `command_limits`, and as stale one of a tick
-        before `oldest` or after `tick`, the newest of which the robots' states are published. Of
-        two commands of one tick the first counts: the plant cannot know which of them is meant.
-        That they differ is told.
+        Refused are a command with numbers beyond `command_limits`, and one of a tick before
+        `oldest` or after `tick`, the newest of which the robots' states are published. Of two
+        commands of one tick the first counts: the plant cannot know which of them is meant. That
+        they differ is told.
         """
         robot = self._robots.get(key)
         if robot is None:
-            self.refused[FOREIGN, ""] += 1
             return ""
         try:
             command = decode(payload, Command)
         except MessageError as error:
-            return self._refuse(MALFORMED, robot, str(error))
+            return self._refuse_invalid(robot, str(error))
         known = self.latest.get(robot)
         if known is not None and command.tick == known.tick:
-            if command.row.tobytes() == known.row.tobytes():
-                return self._refuse(STALE, robot)
-            differ = f"command: got two of tick {command.tick} for {robot}, expected one"
-            return self._refuse(CONTRADICTED, robot, f"{differ} (does someone else command it?)")
+            if command.row.tobytes() != known.row.tobytes():
+                differ = f"command: got two of tick {command.tick} for {robot}, expected one"
+                self._refuse_invalid(robot, f"{differ} (does someone else command it?)")
+            return ""
         first = max(oldest, self.tick_of(robot) + 1)
         if not first <= command.tick <= tick:
             wanted = f"{first} … {tick}" if first < tick else f"{first}"
             self._whys[robot] = f"command.tick: got {command.tick}, expected {wanted}"
-            return self._refuse(STALE, robot)
-        excess = describe_excess(command, self._limits)
-        if excess:
-            return self._refuse(IMPLAUSIBLE, robot, excess)
+            return ""
+        if excess := describe_excess(command, self._limits):
+            return self._refuse_invalid(robot, excess)
         self.latest[robot] = command
         self._whys.pop(robot, None)
         return robot
 
-    def _refuse(self, reason: str, robot: str, error: str = "") -> str:
-        """Count a packet; no robot has a newer command by it."""
-        self.refused[reason, robot] += 1
-        if error:
-            self.errors[robot] = self._whys[robot] = error
+    def _refuse_invalid(self, robot: str, error: str) -> str:
+        """Count a packet that no process of this project sends; no robot has a newer command."""
+        self._invalid[robot] += 1
+        self.errors[robot] = self._whys[robot] = error
         return ""

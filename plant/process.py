@@ -8,13 +8,14 @@ from typing import Final
 
 from quadriga.plant.end import TOLD_TO_STOP, End
 from quadriga.plant.lockstep import run_lockstep
+from quadriga.plant.pace import TeamPace
 from quadriga.plant.protocol import Plant
 from quadriga.plant.realtime import run_realtime
 from quadriga.plant.server import PlantServer
-from quadriga.plant.team_pace import TeamPace, team_pace
 from quadriga.plant.team_time import team_time
 from quadriga.plant.words import listen_to_estops, listen_to_words
 from quadriga.shared.bus.barrier import await_agents, meet, start_together
+from quadriga.shared.bus.introduction import Introduction
 from quadriga.shared.bus.lead_watch import Loss, loss_error
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.sections import BRIDGED, Config
@@ -29,6 +30,22 @@ from quadriga.shared.wire import codes
 from quadriga.shared.wire.topics import COMMAND
 
 _PAUSE: Final = 0.002  # s, between two looks of a simulated robot's plant that waits
+
+# What was expected, and what the cause may be, by the code of an end.
+_BAD_ENDS: Final = {
+    codes.PLANT_FAILED: (
+        "a simulation that stays bounded",
+        "gains, loads, pushes or faults that no simulation follows",
+    ),
+    codes.CLOCK_SET: (
+        "a system clock that nobody sets during a walk",
+        "let PTP or chrony set it before; or the computer was suspended",
+    ),
+    codes.PLANT_GONE: (
+        "the plants of all robots until the end",
+        "it failed, was stopped, or lost its link: see what it says itself",
+    ),
+}
 
 PlantFactory = Callable[[Config, tuple[str, ...]], Plant]
 
@@ -50,7 +67,8 @@ def run(
     Raises:
         ConfigError: the plant cannot be built from the configuration.
         BusError: the bus cannot be opened, or the team is not complete in time.
-        ProcessError: another plant, or the link to the router, vanished while the team walked.
+        ProcessError: another plant, or the link to the router, vanished while the team walked, or
+            somebody set the system clock.
         KeyboardInterrupt: it is stopped before its plant is built.
     """
     stopped = stopped or stop_on_signals()
@@ -64,12 +82,13 @@ def run(
         words = listen_to_words(bus)
         if plant.is_robot:
             plant.listen(listen_to_estops(bus))
-        pace = team_pace(bus, config, robot, is_robot=plant.is_robot)
         with interruptible(stopped):
             server = PlantServer(config, plant, bus, time, name)
         server.words = words
-        if not meet(bus, config, stopped):
+        me, realtime = Introduction(bus, config), config.world.mode == "realtime"
+        if not meet(bus, config, stopped, me):
             return
+        pace = TeamPace(bus, config, me) if robot and realtime else None
         end_collection()
         take_priority(config.runtime.priority)
         try:
@@ -98,6 +117,8 @@ def _walk(server: PlantServer, pace: TeamPace | None, stopped: Callable[[], bool
 def _start(server: PlantServer, pace: TeamPace | None, stopped: Callable[[], bool]) -> bool:
     """Get the robots to stand, and start the team; False if `stopped()` came first."""
     bus, config, plant = server.bus, server.config, server.plant
+    if pace is not None:
+        pace.check_clock()
     if plant.is_robot and not await_agents(bus, config, stopped):
         return False
     if not plant.prepare(stopped):
@@ -116,23 +137,12 @@ def _check_end(end: End | None, team: str, tick: int) -> None:
     """Complain if the walk was over for this plant because something vanished.
 
     Raises:
-        ProcessError: another plant, or the link to the router; or the simulation is unstable.
+        ProcessError: another plant, or the link to the router; or the simulation is unstable; or
+            the system clock was set, by which plants of single robots go.
     """
     if end is None:
         return
     if end.code == codes.LINK_LOST:
         raise loss_error(Loss(*end), tick)
-    if end.code == codes.PLANT_FAILED:
-        raise ProcessError(
-            f"team {team!r} at {tick} ms",
-            end.detail,
-            "a simulation that stays bounded",
-            "gains, loads, pushes or faults that no simulation follows",
-        )
-    if end.code == codes.PLANT_GONE:
-        raise ProcessError(
-            f"team {team!r}",
-            end.detail,
-            "the plants of all robots until the end",
-            "it failed, was stopped, or lost its link: see what it says itself",
-        )
+    if end.code in _BAD_ENDS:
+        raise ProcessError(f"team {team!r} at {tick} ms", end.detail, *_BAD_ENDS[end.code])

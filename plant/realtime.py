@@ -9,12 +9,13 @@ from quadriga.plant.attendance import note_absences
 from quadriga.plant.deadlines import DAMPED, HELD, PERIOD_MS, Deadlines
 from quadriga.plant.end import TOLD_TO_STOP, End
 from quadriga.plant.late import FRESH, HOLD, Lateness, hold_joints
+from quadriga.plant.pace import TeamPace
 from quadriga.plant.server import PlantServer
-from quadriga.plant.team_pace import TeamPace
+from quadriga.plant.team_time import plant_gone
 from quadriga.shared.bus.zenoh_bus import HERE
 from quadriga.shared.runtime.clock import Rate
 from quadriga.shared.wire import codes
-from quadriga.shared.wire.messages import Command, Status
+from quadriga.shared.wire.messages import Command
 from quadriga.shared.wire.topics import SAMPLE_MS
 
 TICK: Final = 1e-3  # s
@@ -44,8 +45,7 @@ def run_realtime(
         end = server.step(motors.commands())
         if server.plant.tick % PERIOD_MS == 0 or end is not None:
             status = motors.deadlines.status(server.plant.tick, rate.overruns)
-            if pace is not None:
-                status = _describe_clock(server, pace, status)
+            status = status if pace is None else pace.describe(status)
             server.publish_status(server.plant.describe(status))
     code, detail = end or TOLD_TO_STOP
     late = motors.deadlines.describe_late()
@@ -60,16 +60,19 @@ def _look_at_others(server: PlantServer, pace: TeamPace | None) -> None:
     if tick % SAMPLE_MS:
         return
     note_absences(server)
-    if pace is not None:
-        time.look(server.bus.members_at(HERE))
-        time.end = time.end or pace.look()
-
-
-def _describe_clock(server: PlantServer, pace: TeamPace, status: Status) -> Status:
-    status = pace.describe(status)
+    if pace is None or time.end is not None:
+        return
+    time.look(server.bus.members_at(HERE))
+    timeout = server.config.bus.clock_timeout
+    if behind := time.behind(tick - round(1000 * timeout)):
+        note = server.bus.standstill.note
+        time.end = plant_gone(sorted(behind), f"silent for {timeout:g} s{note}")
     if news := pace.news():
-        server.announce(codes.CLOCK, server.plant.names[0], news)
-    return status
+        server.announce(codes.CLOCK_OFF, server.plant.names[0], news)
+    if (was_set := pace.look()) is not None:
+        time.end = was_set
+        if not time.drives:  # who drives time announces the end of the walk, whatever it is
+            server.announce(was_set.code, server.plant.names[0], was_set.detail)
 
 
 class _Motors:

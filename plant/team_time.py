@@ -3,7 +3,8 @@
 The plant of all robots has nobody to ask. Where each robot has a plant of its own, that of the
 first robot drives time. In lock-step no follower takes a tick before the clock has come to its
 end, and the clock waits for every state and command of a tick: so the team ends as one, and what
-is recorded does not depend on who was faster. In real time ticks begin by `plant.team_clock`.
+is recorded does not depend on who was faster. In real time ticks begin by the system clocks, see
+`plant.pace`, and a plant whose messages are too old is given up.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from quadriga.shared.wire.messages import Clock, Event
 from quadriga.shared.wire.topics import CLOCK, COMMAND, EVENT, STATE
 
 _LOOKS: Final = 10  # in real time one each sample, until a plant that is not there is given up
-_JUMP_MS: Final = 5000  # no clock of a team that still walks is so far ahead
+_JUMP_MS: Final = 5000  # no plant of a team that still walks is so far ahead
 
 
 class TeamTime:
@@ -51,6 +52,10 @@ class TeamTime:
         """Plants without which this one may not take `tick` in lock-step."""
         return frozenset()
 
+    def behind(self, oldest: int) -> frozenset[str]:
+        """Plants on which this one depends, and whose newest message is of before tick `oldest`."""
+        return frozenset()
+
     def look(self, present: Collection[str]) -> None:
         """Set `end` if a plant on which this one depends is not among those `present`."""
 
@@ -62,33 +67,30 @@ class LeadTime(TeamTime):
 
     def __init__(self, config: Config, robot: str) -> None:
         super().__init__()
-        team = config.team.name
-        others = [name for name in robot_names(config.team.robots) if name != robot]
-        self._states = {STATE.key(team, name): name for name in others}
-        self._commands = {COMMAND.key(team, name): name for name in others}
-        self._event = EVENT.key(team)
-        self.keys = frozenset({*self._states, *self._commands, self._event})
-        # By robot: how far it is, and its agent, −1 before the first message.
-        self._reached, self._answered = dict.fromkeys(others, -1), dict.fromkeys(others, -1)
+        team, self._event = config.team.name, EVENT.key(config.team.name)
+        names = [name for name in robot_names(config.team.robots) if name != robot]
+        # By robot the keys of its plant and of its agent, and by key the newest tick, −1 at first.
+        self._others = {name: (STATE.key(team, name), COMMAND.key(team, name)) for name in names}
+        self._newest = {key: -1 for keys in self._others.values() for key in keys}
+        self.keys = frozenset({*self._newest, self._event})
         self._silent: set[str] = set()
+        self._most_ahead = _JUMP_MS if config.world.mode == "realtime" else 0
 
     def take(self, key: str, payload: bytes, tick: int) -> None:
+        head = envelope(payload)
         if key == self._event:
             self._take_event(payload)
-            return
-        head = envelope(payload)
-        if head is None or head[0] > tick:  # nobody is ahead of who drives time
-            return
-        newest = self._reached if key in self._states else self._answered
-        robot = (self._states if key in self._states else self._commands)[key]
-        newest[robot] = max(newest[robot], head[0])
+        elif head is not None and head[0] <= tick + self._most_ahead:
+            self._newest[key] = max(self._newest[key], head[0])
 
     def _take_event(self, payload: bytes) -> None:
         try:
             event = decode(payload, Event)
         except MessageError:
             return
-        if event.robot not in self._reached:
+        if event.code == codes.CLOCK_SET:
+            self.end = self.end or End(event.code, event.detail)
+        if event.robot not in self._others:
             return
         if event.code in codes.DOWN:
             self.falls.append(event)
@@ -98,14 +100,19 @@ class LeadTime(TeamTime):
             self._silent.discard(event.robot)
 
     def awaited(self, tick: int) -> frozenset[str]:
-        return frozenset(
+        unanswered = (
             plant_name(name)
-            for name, reached in self._reached.items()
-            if reached < tick or (self._answered[name] < tick and name not in self._silent)
+            for name, (_, command) in self._others.items()
+            if self._newest[command] < tick and name not in self._silent
         )
+        return self.behind(tick).union(unanswered)
+
+    def behind(self, oldest: int) -> frozenset[str]:
+        found = (n for n, (state, _) in self._others.items() if self._newest[state] < oldest)
+        return frozenset(map(plant_name, found))
 
     def look(self, present: Collection[str]) -> None:
-        gone = [plant_name(n) for n in self._reached if plant_name(n) not in present]
+        gone = [plant for plant in map(plant_name, self._others) if plant not in present]
         if gone and self.end is None:
             self.end = plant_gone(gone, "gone")
 
@@ -138,7 +145,10 @@ class FollowerTime(TeamTime):
             self._now = now
 
     def awaited(self, tick: int) -> frozenset[str]:
-        return self._lead if self._now <= tick else frozenset()
+        return self.behind(tick + 1)
+
+    def behind(self, oldest: int) -> frozenset[str]:
+        return self._lead if self._now < oldest else frozenset()
 
     def look(self, present: Collection[str]) -> None:
         if has_lead(present):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Final
 
 from quadriga.doctor.machine import check_machine, need_of
@@ -13,7 +14,7 @@ from quadriga.shared.bus.agreement import REFUSED as DECISIVE
 from quadriga.shared.bus.agreement import disagreements
 from quadriga.shared.bus.diagnosis import BAD, GOOD, NOTE, UNKNOWN, Diagnosis
 from quadriga.shared.bus.distrust import REVOKED
-from quadriga.shared.bus.inquiry import look, pause
+from quadriga.shared.bus.inquiry import ask_clock, look, pause
 from quadriga.shared.bus.introduction import describe_process
 from quadriga.shared.bus.reach import OPEN, REFUSED, UNTRIED, Reach, is_loopback, try_endpoint
 from quadriga.shared.bus.roster import members, processes
@@ -21,7 +22,7 @@ from quadriga.shared.bus.zenoh_bus import HERE, Bus
 from quadriga.shared.config.endpoints import is_tls
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError, ConfigError
-from quadriga.shared.members import DOCTOR, Member
+from quadriga.shared.members import DOCTOR, SIM, Member
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.runtime.installed import project_version
 from quadriga.shared.security.tls import tls_files
@@ -88,10 +89,20 @@ def _look_at_team(config: Config, me: About) -> tuple[TeamView, Diagnosis]:
             if monotonic() > deadline:
                 break
             pause()
-        view = look(bus, config, me)
+        view = _compare_clocks(bus, config, look(bus, config, me))
     if view.linked:
         return view, Diagnosis(LINK, GOOD, f"linked by {config.bus.endpoint}")
     return view, _judge_reach(try_endpoint(config.bus.endpoint), waiting=False)
+
+
+def _compare_clocks(bus: Bus, config: Config, view: TeamView) -> TeamView:
+    """The same view, with those answers of plants that tell best what their clocks show."""
+    if config.team.plants == "one" or config.world.mode != "realtime":
+        return view
+    plants = [member.name for member in processes(config) if member.role.name == SIM]
+    alone = [name for name in plants if len(view.answers.get(name, ())) == 1]
+    nearest = {name: [answer] for name in alone if (answer := ask_clock(bus, name)) is not None}
+    return replace(view, answers={**view.answers, **nearest})
 
 
 def _lack_of_certificate(config: Config) -> Diagnosis | None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from quadriga.doctor.packages import check_packages
-from quadriga.shared.bus.absence import CLOCK_LIMIT
+from quadriga.shared.bus.absence import CLOCK_LIMIT, CLOCK_REMEDY
 from quadriga.shared.bus.diagnosis import BAD, GOOD, NOTE, UNKNOWN, Diagnosis
 from quadriga.shared.bus.roster import processes
 from quadriga.shared.bus.zenoh_settings import RECEIVE_BUFFER
@@ -215,17 +215,16 @@ def check_buffer(permitted: int | None, need: MachineNeed) -> Diagnosis:
 
 
 def check_clock(error: float | None, need: MachineNeed) -> Diagnosis:
-    """Recordings are read, and certificates judged, by wall clocks."""
+    """Recordings are read, certificates judged, and plants of single robots paced by it."""
     if error is None:
         return _unknown(CLOCK, "how well the wall clock is kept")
-    remedy = "keep it by NTP or PTP: `timedatectl set-ntp true`"
     if not error:
         verdict = BAD if need.spread else NOTE
-        return Diagnosis(CLOCK, verdict, "nobody keeps the wall clock", remedy)
-    text = f"the wall clock is kept to {1e3 * error:.3g} ms"
+        return Diagnosis(CLOCK, verdict, "nobody keeps the system clock", CLOCK_REMEDY)
+    text = f"the system clock is kept to {1e3 * error:.3g} ms"
     if error <= CLOCK_LIMIT:
         return Diagnosis(CLOCK, GOOD, text)
-    return Diagnosis(CLOCK, BAD if need.spread else NOTE, text, remedy)
+    return Diagnosis(CLOCK, BAD if need.spread else NOTE, text, CLOCK_REMEDY)
 
 
 def _unknown(code: str, what: str) -> Diagnosis:

@@ -40,7 +40,6 @@ from quadriga.shared.wire.topics import COMMAND, STATE
 __all__ = ["RECORDING", "SUMMARY", "kept_summary", "steady_from", "summarise", "summary_of"]
 
 SUMMARY: Final = "summary.json"
-_SOURCES: Final = ("clock.leads", "clock.by_ping_pong", "clock.by_system_clock")
 SETTLING_MS: Final = 1000  # after the speed ramp's end, until the steady part begins
 
 
@@ -213,20 +212,16 @@ def _deadlines(traces: Traces) -> dict[str, Any]:
 
 
 def _clock(statuses: Sequence[Status]) -> dict[str, Any] | None:
-    """How well a plant knew the team's clock; None of one that has no other beside it."""
-    errors = [
-        status.ages_ms["clock.error"] for status in statuses if "clock.error" in status.ages_ms
-    ]
-    if not errors:
+    """By how much a plant's system clock was off for sure, ms; None of one that leads or is alone.
+
+    Of all comparisons it is that which shows most: whose offset exceeds its error by most.
+    """
+    ages = [status.ages_ms for status in statuses if "clock.offset" in status.ages_ms]
+    found = [(abs(age["clock.offset"]), age["clock.error"]) for age in ages]
+    if not found:
         return None
-    last = statuses[-1]
-    sources = [name.removeprefix("clock.") for name in _SOURCES if name in last.counters]
-    return {
-        "source": " ".join(sources).replace("_", " "),
-        "error_ms_max": max(errors),
-        "round_trip_ms": last.ages_ms.get("clock.round_trip"),
-        "drift_ppm": last.ages_ms.get("clock.drift_ppm"),
-    }
+    offset, error = max(found, key=lambda pair: pair[0] - pair[1])
+    return {"offset_ms": offset, "error_ms": error}
 
 
 def _spread(status: Status, name: str) -> dict[str, float]:

@@ -81,17 +81,9 @@ def _list_lateness(realtime: Mapping[str, Any] | None) -> list[tuple[str, str]]:
             text += f"{age}; {jitter}"
         shown.append((f"{name} late", text))
         if figures.get("clock"):
-            shown.append((f"{name} clock", _describe_clock(figures["clock"])))
+            offset, error = figures["clock"]["offset_ms"], figures["clock"]["error_ms"]
+            shown.append((f"{name} clock", f"off by {offset:.2f} ± {error:.2f} ms"))
     return shown
-
-
-def _describe_clock(clock: Mapping[str, Any]) -> str:
-    if clock["round_trip_ms"] is None:
-        return clock["source"] or "not known"
-    return (
-        f"{clock['source']}, error at most {clock['error_ms_max']:.2f} ms; round trip "
-        f"{clock['round_trip_ms']:.2f} ms, drift {clock['drift_ppm']:+.0f} ppm"
-    )
 
 
 def _format_spread(name: str, of: Mapping[str, float]) -> str:

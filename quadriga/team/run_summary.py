@@ -13,13 +13,21 @@ from quadriga.recordings.summary_table import print_summary
 from quadriga.recordings.traces import read_traces
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.wire.codes import LEAD_GONE, LINK_LOST, PLANT_FAILED, PLANT_GONE, SIGNAL
+from quadriga.shared.wire.codes import (
+    CLOCK_SET,
+    LEAD_GONE,
+    LINK_LOST,
+    PLANT_FAILED,
+    PLANT_GONE,
+    SIGNAL,
+)
 
 # Of an end that should not be, by the code of its event; "" where none was recorded.
 _CAUSES: Final = {
     "": "the sim server or its link failed",
     SIGNAL: "the sim server was told to stop",
     PLANT_GONE: "one robot's plant failed, left or fell silent",
+    CLOCK_SET: "somebody set the system clock of a plant's computer, or it was suspended",
     PLANT_FAILED: "the plant failed: its log tells why",
     LEAD_GONE: "who drives time was killed, failed or was cut off",
     LINK_LOST: "the router was killed or stopped, or the network failed",

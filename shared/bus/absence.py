@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, NamedTuple
 
 from quadriga.shared.bus.agreement import REFUSED, REMEDIES, TeamNorm, disagreements
 from quadriga.shared.bus.diagnosis import BAD, GOOD, NOTE, Diagnosis
@@ -27,13 +27,35 @@ NOT_SEEN: Final = "not-seen"
 NOT_REALTIME: Final = "not-realtime"
 
 _REASONS_ENOUGH: Final = (REVOKED, EXPIRED)  # why a process is not on the bus
-CLOCK_LIMIT: Final = 0.1  # s, by which wall clocks may differ: recordings are read by them
+CLOCK_LIMIT: Final = 0.1  # s, by which system clocks may differ: recordings are read by them
+PACE_LIMIT: Final = 1e-3  # s, by which those of plants may that pace their robots by them
+CLOCK_REMEDY: Final = "keep the clocks of all computers by PTP (ptp4l, phc2sys) or chrony"
+_PACED: Final = frozenset({'team.plants="each"', 'world.mode="realtime"'})  # of the configuration
 _STAGES: Final = {
     STARTED: (NOTE, "on the bus, has not announced itself yet"),
     HERE: (NOTE, "here, waits for the others"),
     WARMING_UP: (NOTE, "still warming up"),
     READY: (GOOD, "ready"),
 }
+
+
+class ClockOffset(NamedTuple):
+    """How far one system clock is ahead of another, and how far that may be off, s."""
+
+    ahead: float
+    error: float
+
+    def __sub__(self, other: ClockOffset) -> ClockOffset:
+        """The offset between two clocks that were both compared with a third."""
+        return ClockOffset(self.ahead - other.ahead, self.error + other.error)
+
+    def exceeds(self, limit: float) -> bool:
+        """Whether the clocks differ by more than `limit` for sure."""
+        return abs(self.ahead) - self.error > limit
+
+    def __str__(self) -> str:
+        size, direction = abs(self.ahead), "ahead of" if self.ahead > 0.0 else "behind"
+        return f"{size:.3g} s {direction}" if size >= 1.0 else f"{1e3 * size:.3g} ms {direction}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,12 +73,12 @@ class MemberAnswer:
     arrived_ns: int
 
     @property
-    def clock_offset(self) -> tuple[float, float]:
-        """How far its wall clock is ahead of the asker's, and how far that may be off, s."""
+    def clock_offset(self) -> ClockOffset:
+        """How far its system clock is ahead of the asker's; zeros if it cannot be read."""
         if self.about is None:
-            return 0.0, 0.0
-        middle = (self.asked_ns + self.arrived_ns) // 2
-        return 1e-9 * (self.about.wall_ns - middle), 5e-10 * (self.arrived_ns - self.asked_ns)
+            return ClockOffset(0.0, 0.0)
+        middle, round_trip = (self.asked_ns + self.arrived_ns) // 2, self.arrived_ns - self.asked_ns
+        return ClockOffset(1e-9 * (self.about.wall_ns - middle), 5e-10 * round_trip)
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +116,7 @@ def diagnose(member: Member, view: TeamView) -> tuple[Diagnosis, ...]:
     refused = tuple(diagnose_refusals(member.name, view.refused, here=about is not None))
     if about is not None:
         stage, differs = _explain_stage(about, view), _find_differences(about, view)
-        return (*doubled, *stage, *differs, *refused)
+        return (*doubled, *stage, *differs, *_compare_clocks(member, view), *refused)
     if any(item.code in _REASONS_ENOUGH for item in refused):
         return (*doubled, *refused)
     return (*doubled, *refused, _explain_silence(member, view))
@@ -179,9 +201,17 @@ def _find_differences(about: About, view: TeamView) -> Iterator[Diagnosis]:
         verdict = BAD if item.of in REFUSED else NOTE
         text = f"another {item.of}: {item.got}, {item.owner} has {item.wanted}"
         yield Diagnosis(f"{DIFFERS}{item.of}", verdict, text, REMEDIES[item.of])
-    for answer in view.answers[about.name]:
-        offset, error = answer.clock_offset
-        if abs(offset) - error > CLOCK_LIMIT:
-            text = f"its wall clock is {abs(offset):.3g} s {'ahead' if offset > 0 else 'behind'}"
-            cause = "keep the clocks of all computers by NTP or PTP: `timedatectl set-ntp true`"
-            yield Diagnosis(CLOCK_OFF, BAD, text, cause)
+
+
+def _compare_clocks(member: Member, view: TeamView) -> Iterator[Diagnosis]:
+    """That its system clock is off: against this computer's, or by which plants pace robots."""
+    leader = view.norm.lead if view.norm else None
+    paces = member.role.name == SIM and leader is not None and _PACED.issubset(leader.config)
+    led = [said.clock_offset for said in view.answers.get(leader.name, ())] if leader else []
+    for answer in view.answers[member.name]:
+        if answer.clock_offset.exceeds(CLOCK_LIMIT):
+            text = f"its system clock is {answer.clock_offset} this computer's"
+            yield Diagnosis(CLOCK_OFF, BAD, text, CLOCK_REMEDY)
+        elif paces and led and (offset := answer.clock_offset - led[0]).exceeds(PACE_LIMIT):
+            text = f"its system clock is {offset} that of the plant which drives time"
+            yield Diagnosis(CLOCK_OFF, BAD, text, CLOCK_REMEDY)

@@ -29,6 +29,7 @@ _TIMEOUT: Final = 1.0  # s, for an answer: whoever is not frozen gives it within
 _GRACE: Final = 0.5  # s more, after which nothing is awaited whatever the bus says
 _PATIENCE: Final = 3.0  # s, in which those that do not answer are asked again
 _BETWEEN: Final = 0.1  # s, between two questions to one that does not answer
+_CLOCK_ASKS: Final = 8  # of which that with the shortest round trip tells a clock best
 
 
 def pause() -> None:
@@ -53,6 +54,23 @@ def ask(bus: Bus, names: Collection[str] = ALL, wait: Pause = pause) -> Told:
             answer = MemberAnswer(read_about(name, payload), question.asked_ns, arrived_ns)
             told.setdefault(name, []).append(answer)
     return told
+
+
+def ask_clock(bus: Bus, name: str, wait: Pause = pause) -> MemberAnswer | None:
+    """Of some answers that with the shortest round trip; None if it does not answer.
+
+    Args:
+        bus: where it is.
+        name: whom to ask; of two processes of this name the nearer one answers.
+        wait: called all the time meanwhile; takes some milliseconds.
+    """
+    heard = list[MemberAnswer]()
+    for _ in range(_CLOCK_ASKS):
+        new = [item for item in ask(bus, (name,), wait).get(name, ()) if item.about is not None]
+        if not new:  # to ask one that is frozen takes a second
+            break
+        heard += new
+    return min(heard, key=lambda item: item.clock_offset.error, default=None)
 
 
 def ask_router(bus: Bus, config: Config, wait: Pause = pause) -> tuple[PastRefusal, ...] | None:

@@ -11,6 +11,7 @@ from quadriga.shared.bus.zenoh_bus import HERE, Bus
 from quadriga.shared.config.agreed import agreed_keys
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import RECORDER
+from quadriga.shared.runtime.clock import wall_ns
 from quadriga.shared.runtime.installed import (
     PROJECT,
     code_digest,
@@ -18,7 +19,6 @@ from quadriga.shared.runtime.installed import (
     project_version,
 )
 from quadriga.shared.runtime.scheduling import REALTIME, has_priority
-from quadriga.shared.runtime.system_clock import read_clocks
 from quadriga.shared.wire.about import ABOUT, STARTED, About, scheduling_of, stage_of
 from quadriga.shared.wire.codec import encode
 from quadriga.shared.wire.schema import message_forms
@@ -36,6 +36,7 @@ class Introduction:
 
     Attributes:
         met: whether this process has seen that all are here.
+        start_ns: when tick 0 begins by the system clock, of the plant that drives time for others.
     """
 
     def __init__(self, bus: Bus, config: Config, predictor_sha256: str = "") -> None:
@@ -44,21 +45,20 @@ class Introduction:
         paced = config.world.mode == "realtime" and bus.name != RECORDER
         self._wanted = paced and config.runtime.priority == REALTIME
         self._fixed = describe_process(config, bus.name, predictor_sha256)
-        self.met = False
+        self.met, self.start_ns = False, 0
         bus.answer(ABOUT.key(bus.team, bus.name), lambda: encode(self.about))
 
     @property
     def about(self) -> About:
         """What this process says of itself now."""
         stage = stage_of(self._bus.reached, met=self.met)
-        _, wall_ns, wall_error_ns = read_clocks()
         return replace(
             self._fixed,
             stage=stage,
             scheduling=scheduling_of(wanted=self._wanted, granted=has_priority(), stage=stage),
             sees=tuple(sorted(self._bus.members_at(HERE))),
-            wall_ns=wall_ns,
-            wall_error_ns=wall_error_ns,
+            wall_ns=wall_ns(),
+            start_ns=self.start_ns,
         )
 
 
@@ -81,5 +81,5 @@ def describe_process(config: Config, name: str, predictor_sha256: str = "") -> A
         scheduling=scheduling_of(wanted=False, granted=False, stage=STARTED),
         sees=(),
         wall_ns=0,
-        wall_error_ns=0,
+        start_ns=0,
     )

@@ -114,7 +114,8 @@ class BusConfig:
     clock_timeout: float = key(
         0.5,
         "s",
-        "realtime, plants of their own: silence after which a plant is given up and the walk ends",
+        "realtime, plants of their own: how old the newest message of a plant may be; one that is "
+        "silent or behind for longer is given up and the walk ends",
         low=0.3,
         high=10.0,
     )

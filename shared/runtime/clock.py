@@ -27,11 +27,22 @@ def thread_ns() -> int:
 
 
 def wall_ns() -> int:
-    """Nanoseconds since 1970: for names of run folders, never for control.
-
-    The clocks of computers are compared by it where they say how exact it is.
-    """
+    """Nanoseconds since 1970 of the system clock, which somebody may set at any time."""
     return time.time_ns()
+
+
+def wall_offset() -> tuple[int, int]:
+    """The system clock minus the monotonic one, and how far that may be off, ns.
+
+    Of three readings that counts which was interrupted least. On Linux it changes only when
+    somebody sets the system clock: what PTP or NTP does to its rate both clocks follow.
+    """
+    readings = list[tuple[int, int]]()
+    for _ in range(3):
+        before, wall, after = time.monotonic_ns(), time.time_ns(), time.monotonic_ns()
+        readings.append((after - before, wall - (before + after) // 2))
+    apart, offset = min(readings)
+    return offset, apart // 2 + 1
 
 
 def format_local(form: str, ns: int) -> str:

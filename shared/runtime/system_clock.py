@@ -7,8 +7,6 @@ import sys
 from functools import cache
 from typing import Any, Final
 
-from quadriga.shared.runtime.clock import monotonic_ns, wall_ns
-
 # Some daemons (phc2sys of linuxptp, systemd-timesyncd) tell the kernel of no error at all.
 LEAST_ERROR_NS: Final = 100_000
 _UNSYNCHRONISED: Final = 0x0040  # STA_UNSYNC of <sys/timex.h>
@@ -45,16 +43,3 @@ def system_clock_error_ns() -> int:
 @cache
 def _libc() -> Any:
     return ctypes.CDLL(None)
-
-
-def read_clocks() -> tuple[int, int, int]:
-    """The monotonic clock, the wall clock at the same time, and the wall clock's error, ns.
-
-    The error is that of `system_clock_error_ns`, with what passed between both readings if there
-    is one.
-    """
-    before = monotonic_ns()
-    wall = wall_ns()
-    apart = monotonic_ns() - before
-    error = system_clock_error_ns()
-    return before + apart // 2, wall, error + apart if error else 0

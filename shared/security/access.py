@@ -26,16 +26,7 @@ from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.security.roll import Identity, common_name, team_roll, valid_names
 from quadriga.shared.wire.about import QUESTIONS
 from quadriga.shared.wire.topic import Topic
-from quadriga.shared.wire.topics import (
-    CLOCK,
-    CLOCK_ANSWER,
-    ESTOP,
-    RECEIVED,
-    STATE,
-    STATUS,
-    TABLE,
-    TRUTH,
-)
+from quadriga.shared.wire.topics import CLOCK, ESTOP, RECEIVED, STATE, STATUS, TABLE, TRUTH
 
 # Keys of the questions that a router asks itself, behind `<team>/probe/`.
 ALLOWED: Final = "allowed"
@@ -49,7 +40,7 @@ _MOST_ROBOTS: Final = 10  # of a team, see `team.robots`
 
 _IN, _OUT, _BOTH = ["ingress"], ["egress"], ["ingress", "egress"]
 _HEARERS: Final = (RECORDER, OBSERVER, DOCTOR)  # they hear everything and say nothing
-_OF_LEAD: Final = (CLOCK, TRUTH, CLOCK_ANSWER)  # only who drives time knows
+_OF_LEAD: Final = (CLOCK, TRUTH)  # only who drives time knows
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,7 +131,7 @@ def _names_in_keys(who: Identity, topic: Topic, robots: Sequence[str]) -> Iterab
         return ("",)
     if topic is STATUS:
         return (who.name,)
-    return (who.robot,) if who.robot and topic is not CLOCK_ANSWER else robots
+    return (who.robot,) if who.robot else robots
 
 
 def _heard(who: Identity, team: str) -> tuple[str, ...]:

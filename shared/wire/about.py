@@ -61,8 +61,10 @@ class About(Message):
     stage: str = plain(str, "started, here, warming-up or ready")
     scheduling: str = plain(str, "realtime, ordinary or refused")
     sees: tuple[str, ...] = plain(list, "the others that it sees on the bus")
-    wall_ns: int = plain(int, "its wall clock [ns since 1970]")
-    wall_error_ns: int = plain(int, "how far that may be off; 0: it is not synchronised [ns]")
+    wall_ns: int = plain(int, "its system clock [ns since 1970]")
+    start_ns: int = plain(
+        int, "when tick 0 begins by it, of the plant that drives time for others; 0: not yet [ns]"
+    )
 
 
 @record

@@ -57,7 +57,8 @@ STANDS_AGAIN: Final = "stands-again"
 LINK_BACK: Final = "link-back"
 BRIDGE_MODE: Final = "bridge-mode"
 ROBOT_STOPPED: Final = "robot-stopped"
-CLOCK: Final = "clock"
+CLOCK_OFF: Final = "clock-off"
+CLOCK_SET: Final = "clock-set"
 
 EVENTS: Final[Mapping[str, EventCode]] = MappingProxyType(
     {
@@ -95,12 +96,13 @@ EVENTS: Final[Mapping[str, EventCode]] = MappingProxyType(
             "bridge", "a bridge's robot begins to stand up, walk or lie down, or is hot"
         ),
         ROBOT_STOPPED: EventCode("fault", "a bridge has stopped its robot: damped, then passive"),
-        CLOCK: EventCode("fault", "how well a plant knows the team's clock crosses 1 ms"),
+        CLOCK_OFF: EventCode("fault", "a plant's system clock is off by more than 1 ms"),
         TIME_OVER: EventCode("stop", "the walk is over: world.seconds have passed"),
         FALLEN: EventCode("stop", "the walk is over: a robot fell"),
         SIGNAL: EventCode("stop", "the walk is over: the world was told to stop"),
         STOPPED: EventCode("stop", "the walk is over: somebody has asked the team to stop"),
         PLANT_GONE: EventCode("stop", "the walk is over: one of several plants left or is silent"),
+        CLOCK_SET: EventCode("stop", "the walk is over: somebody set a plant's system clock"),
         PLANT_FAILED: EventCode("stop", "the walk is over: the plant failed"),
         LINK_LOST: EventCode("stop", "the walk is over: the link to the router is gone"),
         LEAD_GONE: EventCode("stop", "who drives time vanished: as the recorder notes it"),

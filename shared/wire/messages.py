@@ -271,29 +271,6 @@ class Clock(Message):
 
 
 @record
-class ClockAsk(Message):
-    """A plant asks the one that drives time, in real time, what its clock shows."""
-
-    asked_ns: int = plain(int, "when it was sent, by the asker's clock [ns]")
-    start_ns: int = plain(int, "when tick 0 begins, as the asker has heard; 0: not yet [ns]")
-    late_ns: int = plain(int, "how late the asker's newest tick began [ns]")
-
-
-@record
-class ClockAnswer(Message):
-    """The answer: clocks are those of the plant that drives time, unless said otherwise."""
-
-    asked_ns: int = plain(
-        int, "as in the ask, by the asker's clock; 0: unasked news of start_ns [ns]"
-    )
-    received_ns: int = plain(int, "when the ask arrived [ns]")
-    answered_ns: int = plain(int, "when the answer was sent [ns]")
-    wall_ns: int = plain(int, "its wall clock then [ns since 1970]")
-    wall_error_ns: int = plain(int, "how far that may be off; 0: it is not synchronised [ns]")
-    start_ns: int = plain(int, "when tick 0 begins; 0: not agreed yet [ns]")
-
-
-@record
 class Event(Message):
     """Something happened in the world.
 

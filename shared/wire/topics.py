@@ -90,21 +90,13 @@ CLOCK: Final = Topic(
 POSTURE: Final = Topic(
     "posture", msg.State, (SIM,), (), per_robot=True, period_ms=SAMPLE_MS, recorded=False
 )
-# In real time between plants of single robots; clocks of computers, so not of a replay. They tell
-# afterwards how well the team's clock was known, and cost 2 kB/s.
-CLOCK_ASK: Final = Topic(
-    "clock_ask", msg.ClockAsk, (SIM,), (SIM,), per_robot=True, period_ms=0, repeats=True
-)
-CLOCK_ANSWER: Final = Topic(
-    "clock_answer", msg.ClockAnswer, (SIM,), (SIM,), per_robot=True, period_ms=0, repeats=True
-)
 
 # What a router has refused, if it has rules; the tick is the last of the clock that it heard.
 REFUSED: Final = Topic("refused", msg.Refusal, (ROUTER,), (), period_ms=0, repeats=True)
 
 _OWN: Final = (
     STATE, COMMAND, MEASUREMENT, PLAN, STATUS, INPUTS, REFERENCE, *WORDS, LIVE_FAULT, TRUTH,
-    EVENT, AGENT_EVENT, INJECTED, CLOCK, POSTURE, CLOCK_ASK, CLOCK_ANSWER, REFUSED,
+    EVENT, AGENT_EVENT, INJECTED, CLOCK, POSTURE, REFUSED,
 )  # fmt: skip
 TABLE: Final = (*_OWN, *plugin_topics(_OWN))
 _BY_NAME: Final = {topic.name: topic for topic in TABLE}

@@ -26,7 +26,7 @@ from quadriga.bridges.supervisor import (
     SupervisorInputs,
     SupervisorState,
 )
-from quadriga.plant.command_limits import MOST_KD, MOST_KP
+from quadriga.plant.commands import MOST_KD, MOST_KP
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
 from quadriga.shared.runtime.clock import monotonic

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from quadriga.plant.command_limits import command_limits
-from quadriga.plant.commands import CONTRADICTED, FOREIGN, IMPLAUSIBLE, STALE, CommandBox
+from quadriga.plant.commands import CommandBox, command_limits
 from quadriga.shared.config.sections import TeamConfig
 from quadriga.shared.robot.a1 import A1
 from quadriga.shared.robot.robots import ROBOTS
@@ -44,20 +43,18 @@ def test_the_command_of_the_tick_is_taken(box: CommandBox) -> None:
     assert box.take(KEY, command(5, 1.0), tick=5, oldest=5) == "r1"
     assert box.latest["r1"].tau[0] == 1.0
     assert (box.tick_of("r1"), box.tick_of("r2")) == (5, -1)
-    assert not box.refused
+    assert box.invalid_of("r1") == 0
 
 
 @pytest.mark.parametrize("wrong", [4, 6, MAX_TICK - 1])
 def test_lock_step_discards_other_ticks(box: CommandBox, wrong: int) -> None:
     assert box.take(KEY, command(wrong), tick=5, oldest=5) == ""
-    assert box.refused == {(STALE, "r1"): 1}
-    assert box.latest == {}
+    assert (box.invalid_of("r1"), box.latest) == (0, {})
 
 
 def test_a_repeated_command_does_not_count_twice(box: CommandBox) -> None:
     assert box.take(KEY, command(5, 1.0), tick=5, oldest=5) == "r1"
     assert box.take(KEY, command(5, 1.0), tick=5, oldest=5) == ""
-    assert box.refused == {(STALE, "r1"): 1}
     assert (box.invalid_of("r1"), box.errors) == (0, {})
 
 
@@ -67,7 +64,6 @@ def test_two_commands_of_one_tick_are_told(box: CommandBox) -> None:
     for tick in (5, 6):  # in lock-step, too, once the world has gone on
         assert box.take(KEY, command(5, 1.5), tick=tick, oldest=tick) == ""
     assert box.latest["r1"].tau[0] == 1.0
-    assert box.refused == {(CONTRADICTED, "r1"): 2}
     assert box.invalid_of("r1") == 2
     assert "two of tick 5 for r1" in box.errors["r1"]
 
@@ -116,7 +112,6 @@ def test_what_no_motor_can_be_meant_to_do_is_dropped_and_counted(
     box: CommandBox, wrong: dict[str, float]
 ) -> None:
     assert box.take(KEY, command_of(**wrong), tick=5, oldest=5) == ""
-    assert box.refused == {(IMPLAUSIBLE, "r1"): 1}
     assert box.invalid_of("r1") == 1
     assert box.errors["r1"].startswith(f"command.{next(iter(wrong))}: got ")
     assert box.latest == {}
@@ -162,7 +157,7 @@ def test_no_command_that_is_taken_makes_the_world_lose_its_numbers(kind: str) ->
 def test_a_robot_of_another_team_or_none_is_foreign(box: CommandBox) -> None:
     for key in ("team/r3/command", "other/r1/command", "team/r1/state"):
         assert box.take(key, command(5), tick=5, oldest=5) == ""
-    assert box.refused == {(FOREIGN, ""): 3}
+    assert box.latest == {}
 
 
 def test_why_a_robot_is_silent_is_known_until_it_is_not(box: CommandBox) -> None:

@@ -101,6 +101,28 @@ def test_followers_leave_by_the_same_event_as_all_others(config: Config) -> None
     assert time.end.code == codes.TIME_OVER
 
 
+@pytest.mark.parametrize("robot", ["r1", "r2"])
+def test_in_real_time_a_plant_is_silent_whose_newest_message_is_too_old(robot: str) -> None:
+    keys = {"team.robots": 2, "team.yokes": "none", "team.plants": "each"}
+    time = team_time(load(None, {**keys, "world.mode": "realtime"}), robot)
+    other, topic, said = (
+        ("plant_r2", STATE.key("team", "r2"), state)
+        if robot == "r1"
+        else ("plant_r1", CLOCK.key("team"), clock)
+    )
+    time.take(topic, said(700), 690)
+    time.take(topic, said(9999), 700)
+    assert not time.behind(700), "it may be ahead, of one that was late, but not by seconds"
+    assert time.behind(701) == {other}
+
+
+def test_all_leave_when_the_system_clock_of_one_was_set(config: Config) -> None:
+    lead = LeadTime(config, "r1")
+    lead.take(EVENT.key("team"), event(codes.CLOCK_SET, "r2", 5), 5)
+    assert lead.end is not None
+    assert lead.end.code == codes.CLOCK_SET
+
+
 def test_a_plant_ends_when_one_that_it_depends_on_is_gone(config: Config) -> None:
     lead, follower = LeadTime(config, "r1"), FollowerTime(config)
     for time, dear, others in (

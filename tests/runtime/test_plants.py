@@ -10,6 +10,7 @@ import subprocess
 import sys
 from collections import defaultdict
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,7 @@ from quadriga.shared.wire.messages import (
 )
 from quadriga.shared.wire.topics import CLOCK
 from quadriga.team import launch
+from quadriga.team.launch import Launch, ProcessSpec
 from tests.runtime.conftest import BEGUN, WAIT, Make, Team
 
 FOREVER = 600.0  # s of world time
@@ -184,13 +186,12 @@ def test_a_frozen_plant_stops_the_team_and_is_named(make_team: Make) -> None:
 
 @pytest.mark.parametrize(("frozen", "other"), [(1, 2), (2, 1)])
 def test_a_frozen_plant_is_missed_in_real_time_whoever_leads(
-    puppets: Make, frozen: int, other: int
+    puppets: Make, watcher: Watcher, frozen: int, other: int
 ) -> None:
     """Robots of the others lie down; an arm's length of silence is enough."""
     team = puppets(world__seconds=FOREVER, bus__clock_timeout=2.0, **EACH, **REALTIME)
     with team.launch() as running:
-        team.await_log("plant_r2", "clock of plant_r1: known to")
-        sleep(1.0)
+        await_clock(watcher(team), 100)
         pid = running.pids[f"plant_r{frozen}"]
         os.kill(pid, signal.SIGSTOP)
         team.await_log(
@@ -199,6 +200,36 @@ def test_a_frozen_plant_is_missed_in_real_time_whoever_leads(
         os.kill(pid, signal.SIGCONT)
         with pytest.raises(ProcessError, match=r"process plant_r[12]"):
             running.watch(never)
+
+
+@pytest.mark.parametrize(
+    ("before", "later", "name", "said"),
+    [
+        ("-0.003 0", "", "plant_r2", " ms behind that of plant_r1, expected 1 ms at most"),
+        ("0 0", "0.005 0", "plant_r1", "clock-set  the system clock of plant_r2 was set by +"),
+        ("0 0", "0 5e-4", "plant_r2", "clock-off r2 its system clock is "),
+    ],
+    ids=["is off", "is set", "drifts"],
+)
+def test_a_plant_whose_system_clock_is_wrong_is_named(
+    puppets: Make, watcher: Watcher, before: str, later: str, name: str, said: str
+) -> None:
+    team = puppets(world__seconds=FOREVER, **EACH, **REALTIME)
+    file = team.folder / "clock"
+    file.write_text(before, encoding="ascii")
+    rows = tuple(skewed(row, file) if row.name == "plant_r2" else row for row in team.rows())
+    with Launch(rows, team.folder / "logs") as running:
+        if later:
+            await_clock(watcher(team), 100)
+            file.write_text(later, encoding="ascii")
+            os.kill(running.pids["plant_r2"], signal.SIGUSR1)
+        team.await_log(name, said)
+
+
+def skewed(row: ProcessSpec, file: Path) -> ProcessSpec:
+    """The same process, in slow motion, by clocks that go as the file tells."""
+    words = (*row.command[:4], "quadriga.faults.skewed", str(file), *row.command[4:])
+    return replace(row, command=words)
 
 
 def test_a_robot_that_leaves_is_led_down_by_its_own_plant_and_the_walk_goes_on(

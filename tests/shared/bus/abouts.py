@@ -26,7 +26,7 @@ SIM: Final = About(
     scheduling=ORDINARY,
     sees=("r1", "r2"),
     wall_ns=10**18,
-    wall_error_ns=0,
+    start_ns=0,
 )
 
 

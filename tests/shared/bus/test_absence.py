@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from quadriga.shared.bus.absence import TeamView, describe_absent, diagnose
+from quadriga.shared.bus.agreement import TeamNorm
 from quadriga.shared.bus.diagnosis import BAD, GOOD, NOTE
 from quadriga.shared.members import Member, team_members
 from quadriga.shared.wire.about import About
@@ -104,8 +106,8 @@ def test_differences_that_no_team_walks_with_are_bad_and_others_are_notes() -> N
     ("ahead_ns", "took_ns", "text"),
     [
         (90_000_000, 0, ""),
-        (3_000_000_000, 10**6, "its wall clock is 3 s ahead"),
-        (-3_000_000_000, 10**6, "its wall clock is 3 s behind"),
+        (3_000_000_000, 10**6, "its system clock is 3 s ahead of this computer's"),
+        (-300_000_000, 10**6, "its system clock is 300 ms behind this computer's"),
         (300_000_000, 500_000_000, ""),  # it may be right: the answer took long
     ],
 )
@@ -115,6 +117,32 @@ def test_a_clock_is_off_by_more_than_what_the_question_took(
     said = answer(about("r2", wall_ns=10**18 + ahead_ns), took_ns)
     found = diagnose(R2, view(*EVERYBODY, answers={"r2": [said]}))
     assert [item.text for item in found if item.code == "clock-off"] == [text] * bool(text)
+
+
+PACED = about("plant_r1", config=('team.plants="each"', 'world.mode="realtime"'))
+EACH = team_members(("r1", "r2"), central=False, recorded=False, plant_each=True)
+
+
+@pytest.mark.parametrize(
+    ("name", "leader", "ahead_ns", "is_off"),
+    [
+        ("plant_r2", PACED, 3_000_000, True),
+        ("plant_r2", PACED, -3_000_000, True),
+        ("plant_r2", PACED, 900_000, False),
+        ("plant_r2", about("plant_r1"), 3_000_000, False),  # in lock-step nobody goes by it
+        ("r2", PACED, 3_000_000, False),
+    ],
+)
+def test_the_clocks_of_plants_that_pace_robots_differ_by_a_millisecond_at_most(
+    name: str, leader: About, ahead_ns: int, is_off: bool
+) -> None:
+    """Whatever the doctor's own clock shows."""
+    off_ns = 10**18 + 50_000_000
+    led, said = replace(leader, wall_ns=off_ns), about(name, wall_ns=off_ns + ahead_ns)
+    answers = {item.name: [answer(item, 500_000)] for item in (led, said)}
+    (member,) = (member for member in EACH if member.name == name)
+    found = diagnose(member, view(answers=answers, norm=TeamNorm(leader)))
+    assert ("clock-off" in [item.code for item in found]) == is_off
 
 
 def test_who_does_not_get_real_time_scheduling_is_told() -> None:
