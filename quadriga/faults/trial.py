@@ -124,10 +124,7 @@ class _FaultTrial:
         return Moment(draw.robot, tick, at)
 
     def _announce(self, teller: FaultTeller) -> None:
-        """Tell the recording of the fault a little before it comes, or let that be told later."""
-        if self._stage.late:
-            self._scene.announce = lambda: teller.tell_begin(teller.read_clock())
-            return
+        """Tell the recording of the fault a little before it comes."""
         tick = self._scene.draw.tick
         self._await_tick(teller, max(1, tick - LEAD_MS))
         teller.tell_begin(tick)

@@ -19,13 +19,12 @@ import zenoh
 
 from quadriga.certs.folder import CertificateFolder
 from quadriga.certs.secured import certificates_of, secure
-from quadriga.faults.security.attacks import client_settings
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.runtime.clock import monotonic, sleep, utc_now
-from quadriga.shared.security.tls import TlsFiles, tls_files
+from quadriga.shared.security.tls import TlsFiles, tls_files, tls_settings
 from quadriga.team.endpoint import free_endpoint
 
 WAIT = 20.0  # s, far more than anything here takes
@@ -94,7 +93,17 @@ def serving(fortress: Fortress) -> Iterator[subprocess.Popen[str]]:
 
 def settings_of(fortress: Fortress, files: TlsFiles | None) -> dict[str, Any]:
     """A stock client's settings, with somebody's files or none."""
-    return client_settings(fortress.config, files) | {"connect/timeout_ms": 1000}
+    own = dict(tls_settings(files, listens=False)) if files else {}
+    authority = fortress.files("observer").authority
+    return {
+        "mode": "client",
+        "connect/endpoints": [fortress.config.bus.endpoint],
+        "scouting/multicast/enabled": False,
+        "connect/timeout_ms": 1000,
+        "connect/exit_on_failure": True,
+        **own,
+        "transport/link/tls/root_ca_certificate": str(authority),
+    }
 
 
 @contextmanager
