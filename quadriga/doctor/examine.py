@@ -8,12 +8,11 @@ from quadriga.doctor.machine import check_machine, need_of
 from quadriga.doctor.readings import read_machine
 from quadriga.doctor.report import DoctorReport, MemberReport
 from quadriga.doctor.trust import look_at_certificates, try_certificate
-from quadriga.shared.bus.absence import DIFFERS, TeamView, diagnose, diagnose_nameless
+from quadriga.shared.bus.absence import DIFFERS, TeamView, diagnose
 from quadriga.shared.bus.agreement import REFUSED as DECISIVE
 from quadriga.shared.bus.agreement import disagreements
 from quadriga.shared.bus.diagnosis import BAD, GOOD, NOTE, UNKNOWN, Diagnosis
-from quadriga.shared.bus.distrust import REVOKED
-from quadriga.shared.bus.inquiry import look, pause
+from quadriga.shared.bus.inquiry import ask, pause, view_of
 from quadriga.shared.bus.introduction import describe_process
 from quadriga.shared.bus.reach import OPEN, REFUSED, UNTRIED, Reach, is_loopback, try_endpoint
 from quadriga.shared.bus.roster import members, processes
@@ -52,14 +51,13 @@ def examine(config: Config, *, here: bool) -> DoctorReport:
     view, link = _look_at_team(config, me)
     differs = tuple(_own_differences(me, view))
     found = tuple(_report(member, view, config) for member in processes(config))
-    router = diagnose_nameless(view)
-    return DoctorReport(team, endpoint, me.version, link, (*differs, *machine), found, router)
+    return DoctorReport(team, endpoint, me.version, link, (*differs, *machine), found)
 
 
 def _report(member: Member, view: TeamView, config: Config) -> MemberReport:
     """What is to be said of a member; of one that is not there also whether it could come in."""
     answers, found = view.answers.get(member.name, ()), diagnose(member, view)
-    if not answers and not any(item.code == REVOKED for item in found):
+    if not answers:
         found += tuple(try_certificate(config, member.name))
     return MemberReport(member.name, answers, found)
 
@@ -88,7 +86,7 @@ def _look_at_team(config: Config, me: About) -> tuple[TeamView, Diagnosis]:
             if monotonic() > deadline:
                 break
             pause()
-        view = look(bus, config, me)
+        view = view_of(bus, config, ask(bus), me)
     if view.linked:
         return view, Diagnosis(LINK, GOOD, f"linked by {config.bus.endpoint}")
     return view, _judge_reach(try_endpoint(config.bus.endpoint), waiting=False)

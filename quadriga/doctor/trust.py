@@ -9,7 +9,6 @@ from typing import Final
 
 from quadriga.doctor.certificates import HeldCertificate, check_certificates
 from quadriga.shared.bus.diagnosis import BAD, GOOD, Diagnosis
-from quadriga.shared.bus.distrust import EXPIRED, NOT_TRUSTED
 from quadriga.shared.config.endpoints import is_tls
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError, system_reason
@@ -21,6 +20,8 @@ from quadriga.shared.security.roll import REVOKED, read_numbers, team_roll
 from quadriga.shared.security.tls import TlsFiles, identity_folder, tls_files
 
 TRUSTED: Final = "trusted"
+EXPIRED: Final = "expired"  # its certificate here, or the router's
+NOT_TRUSTED: Final = "not-trusted"
 
 
 def look_at_certificates(config: Config) -> tuple[Diagnosis, ...]:

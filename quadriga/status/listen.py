@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from quadriga.doctor.health import Health, judge_team
-from quadriga.doctor.watch_team import RecentRefusals, WalkEnd
+from quadriga.doctor.watch_team import WalkEnd
 from quadriga.shared.bus.absence import TeamView
 from quadriga.shared.bus.inquiry import ask, view_of
 from quadriga.shared.bus.introduction import describe_process
@@ -46,7 +46,6 @@ class TeamListener:
         self._config, self._bus = config, bus
         self._team = processes(config)
         self._fold, self._end = StatusFold(config), WalkEnd(bus)
-        self._refusals = RecentRefusals(bus)
         fast = periods(config)
         keys = {
             topic.key(bus.team, "*")
@@ -84,7 +83,7 @@ class TeamListener:
             view = view_of(bus, config, ask(bus), describe_process(config, OBSERVER))
             self._view = view
         here = bus.members_at(HERE)
-        health = {of.name: of for of in judge_team(self._team, view, self._refusals.recent())}
+        health = {of.name: of for of in judge_team(self._team, view)}
         reading = self._fold.look(monotonic_ns())
         members = tuple(
             MemberStatus(

@@ -8,9 +8,7 @@ from typing import Final
 
 from quadriga.shared.bus.agreement import REFUSED, REMEDIES, TeamNorm, disagreements
 from quadriga.shared.bus.diagnosis import BAD, GOOD, NOTE, Diagnosis
-from quadriga.shared.bus.distrust import EXPIRED, REVOKED, diagnose_refusals, diagnose_router
 from quadriga.shared.members import SIM, Member
-from quadriga.shared.security.past_refusals import PastRefusal
 from quadriga.shared.wire.about import HERE, READY, STAGES, STARTED, WARMING_UP, About
 from quadriga.shared.wire.about import REFUSED as NOT_GRANTED
 
@@ -26,7 +24,6 @@ CLOCK_OFF: Final = "clock-off"
 NOT_SEEN: Final = "not-seen"
 NOT_REALTIME: Final = "not-realtime"
 
-_REASONS_ENOUGH: Final = (REVOKED, EXPIRED)  # why a process is not on the bus
 CLOCK_LIMIT: Final = 0.1  # s, by which wall clocks may differ: recordings are read by them
 _STAGES: Final = {
     STARTED: (NOTE, "on the bus, has not announced itself yet"),
@@ -70,7 +67,6 @@ class TeamView:
         answers: what was said, by name; processes of one name answer each.
         names: all that the team should have.
         norm: what all must agree with; None: unknown.
-        refused: what the router has refused, the newest last; None: it ought to say and does not.
     """
 
     linked: bool
@@ -79,7 +75,6 @@ class TeamView:
     names: frozenset[str]
     answers: Mapping[str, Sequence[MemberAnswer]] = field(default_factory=dict)
     norm: TeamNorm | None = None
-    refused: tuple[PastRefusal, ...] | None = ()
 
     def about(self, name: str) -> About | None:
         """What a process has said of itself; of several of one name the one that is further."""
@@ -91,29 +86,19 @@ def diagnose(member: Member, view: TeamView) -> tuple[Diagnosis, ...]:
     """All there is to say of a member: why it is not there, or how far it is and what is wrong."""
     about = view.about(member.name)
     doubled = tuple(_two_of_a_name(member.name, view))
-    refused = tuple(diagnose_refusals(member.name, view.refused, here=about is not None))
     if about is not None:
-        stage, differs = _explain_stage(about, view), _find_differences(about, view)
-        return (*doubled, *stage, *differs, *refused)
-    if any(item.code in _REASONS_ENOUGH for item in refused):
-        return (*doubled, *refused)
-    return (*doubled, *refused, _explain_silence(member, view))
-
-
-def diagnose_nameless(view: TeamView) -> tuple[Diagnosis, ...]:
-    """What the router says, or does not say, that is of no process in particular."""
-    return tuple(diagnose_router(view.refused, complete=view.names <= {*view.answers}))
+        return (*doubled, *_explain_stage(about, view), *_find_differences(about, view))
+    return (*doubled, _explain_silence(member, view))
 
 
 def describe_absent(absent: Collection[Member], view: TeamView) -> str:
-    """Why some are not there, in one line: those of one reason together, the router's word last."""
+    """Why some are not there, in one line: those of one reason together."""
     by_reason: dict[str, list[str]] = {}
     for member in absent:
         found = diagnose(member, view)
         wrong = [item for item in found if item.verdict == BAD] or found
         by_reason.setdefault(", ".join(item.text for item in wrong), []).append(member.name)
-    reasons = [f"{', '.join(names)}: {reason}" for reason, names in by_reason.items()]
-    return "; ".join((*reasons, *(item.text for item in diagnose_nameless(view))))
+    return "; ".join(f"{', '.join(names)}: {reason}" for reason, names in by_reason.items())
 
 
 def _explain_silence(member: Member, view: TeamView) -> Diagnosis:

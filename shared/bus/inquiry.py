@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from contextlib import suppress
-from dataclasses import replace
 from typing import Final
 
 from quadriga.shared.bus.absence import MemberAnswer, TeamView
@@ -12,13 +10,11 @@ from quadriga.shared.bus.agreement import CODE, TeamNorm, disagreements, refuse
 from quadriga.shared.bus.introduction import describe_process
 from quadriga.shared.bus.roster import first_predicting, foreign_members, lead, members
 from quadriga.shared.bus.zenoh_bus import HERE, Bus
-from quadriga.shared.config.endpoints import is_tls
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError, MessageError
-from quadriga.shared.members import LEADS, ROUTER
+from quadriga.shared.members import LEADS
 from quadriga.shared.runtime.clock import monotonic, sleep
-from quadriga.shared.security.past_refusals import PastRefusal, read_entries
-from quadriga.shared.wire.about import ABOUT, REFUSALS, STAGES, About, Refusals
+from quadriga.shared.wire.about import ABOUT, STAGES, About
 from quadriga.shared.wire.codec import decode
 
 Pause = Callable[[], None]
@@ -53,33 +49,6 @@ def ask(bus: Bus, names: Collection[str] = ALL, wait: Pause = pause) -> Told:
             answer = MemberAnswer(read_about(name, payload), question.asked_ns, arrived_ns)
             told.setdefault(name, []).append(answer)
     return told
-
-
-def ask_router(bus: Bus, config: Config, wait: Pause = pause) -> tuple[PastRefusal, ...] | None:
-    """What the router has refused so far; None if one with certificates does not say.
-
-    Args:
-        bus: where it is.
-        config: the team's configuration.
-        wait: called all the time meanwhile; takes some milliseconds.
-    """
-    if not (is_tls(config.bus.endpoint) and bus.linked):
-        return ()
-    deadline = monotonic() + _TIMEOUT
-    while monotonic() < deadline:  # it is asked again: its own word may not have arrived yet
-        question = bus.ask(REFUSALS.key(bus.team, ROUTER), _TIMEOUT)
-        _wait_for(_TIMEOUT + _GRACE, wait, lambda: question.over)  # noqa: B023 (used at once)
-        for _, _, payload in question.take():
-            with suppress(MessageError):
-                return read_entries(decode(payload, Refusals).entries)
-        _wait_for(_BETWEEN, wait)
-    return None
-
-
-def look(bus: Bus, config: Config, fallback: About | None, wait: Pause = pause) -> TeamView:
-    """Ask everybody, the router too; what a process then sees of its team, see `view_of`."""
-    view = view_of(bus, config, ask(bus, wait=wait), fallback)
-    return replace(view, refused=ask_router(bus, config, wait))
 
 
 def view_of(bus: Bus, config: Config, told: Told, fallback: About | None = None) -> TeamView:

@@ -7,7 +7,7 @@ from collections.abc import Collection
 from typing import Final
 
 from quadriga.shared.bus.absence import describe_absent
-from quadriga.shared.bus.inquiry import Pause, look
+from quadriga.shared.bus.inquiry import Pause, ask, view_of
 from quadriga.shared.bus.introduction import describe_process
 from quadriga.shared.bus.roster import processes
 from quadriga.shared.bus.trust import describe_way
@@ -62,6 +62,6 @@ class Watch:
     def _describe(self, absent: Collection[str]) -> tuple[str, bool]:
         """Why some are not there, and whether this process is linked to anybody."""
         bus, config = self._bus, self._config
-        view = look(bus, config, describe_process(config, bus.name), self._wait)
+        view = view_of(bus, config, ask(bus, wait=self._wait), describe_process(config, bus.name))
         waited = [member for member in processes(config) if member.name in absent]
         return describe_absent(waited, view), view.linked

@@ -144,19 +144,6 @@ class Bus:
         """Whether anyone is linked to this process at the moment."""
         return bool(self._session.info.links())
 
-    def watch_links(self, note: Callable[[str, str], None]) -> None:
-        """Call `note` for each link that is or comes, with the other side's session and name.
-
-        The name is the common name of its certificate, or else its address.
-        """
-
-        def take(event: zenoh.LinkEvent) -> None:
-            note(str(event.link.zid), event.link.auth_identifier or event.link.dst)
-
-        self._declarations.append(
-            self._session.info.declare_link_events_listener(_direct(take), history=True)
-        )
-
     def publisher(
         self, key: str, *, droppable: bool = False, urgent: bool = False
     ) -> Callable[[bytes], None]:
@@ -372,11 +359,6 @@ class Bus:
 
     def _note_token(self, sample: zenoh.Sample) -> None:
         self._presence.note(str(sample.key_expr), there=sample.kind == zenoh.SampleKind.PUT)
-
-
-def start_log() -> None:
-    """Have Zenoh write what `RUST_LOG` asks for to the standard output."""
-    zenoh.try_init_log_from_env()  # type: ignore[no-untyped-call]
 
 
 def _packet(sample: zenoh.Sample) -> Packet:

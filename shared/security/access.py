@@ -6,24 +6,14 @@ and what it hears goes out (`egress`).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
 from quadriga.shared.config.sections import Config
-from quadriga.shared.members import (
-    AGENT,
-    DOCTOR,
-    LEADS,
-    OBSERVER,
-    PROBE,
-    RECORDER,
-    ROUTER,
-    SIM,
-    plant_name,
-)
+from quadriga.shared.members import AGENT, DOCTOR, LEADS, OBSERVER, RECORDER, ROUTER
 from quadriga.shared.robot.conventions import robot_names
-from quadriga.shared.security.roll import Identity, common_name, team_roll, valid_names
+from quadriga.shared.security.roll import Identity, team_roll, valid_names
 from quadriga.shared.wire.about import QUESTIONS
 from quadriga.shared.wire.topic import Topic
 from quadriga.shared.wire.topics import (
@@ -36,16 +26,6 @@ from quadriga.shared.wire.topics import (
     TABLE,
     TRUTH,
 )
-
-# Keys of the questions that a router asks itself, behind `<team>/probe/`.
-ALLOWED: Final = "allowed"
-DENIED: Final = "denied"
-LARGE: Final = "large"  # what is put there is larger than permitted
-MANY: Final = "many"  # what is put there comes more often than permitted
-DEAF: Final = "deaf"  # the probe may subscribe to it, and yet hears nothing
-_PROBED: Final = (ALLOWED, LARGE, MANY)
-_OTHERS: Final = "others"  # with a certificate, but no rights
-_MOST_ROBOTS: Final = 10  # of a team, see `team.robots`
 
 _IN, _OUT, _BOTH = ["ingress"], ["egress"], ["ingress", "egress"]
 _HEARERS: Final = (RECORDER, OBSERVER, DOCTOR)  # they hear everything and say nothing
@@ -86,12 +66,7 @@ def access_control(config: Config, revoked: Mapping[str, int]) -> dict[str, Any]
     """
     team = config.team.name
     common = _common_rules(team)
-    rules = [*common, _rule(_OTHERS, ["put"], _OUT, [f"{team}/{PROBE}/nothing"])]
-    # Who has no subject is denied everything too, but Zenoh does not log whom it denies what.
-    subjects: list[dict[str, Any]] = [
-        {"id": _OTHERS, "cert_common_names": list(_names_without_rights(config, revoked))}
-    ]
-    policies = [{"rules": [_OTHERS], "subjects": [_OTHERS]}]
+    rules, subjects, policies = [*common], list[dict[str, Any]](), list[dict[str, Any]]()
     for rights in team_rights(config):
         name = rights.identity.name
         own = _own_rules(rights, team)
@@ -108,22 +83,9 @@ def access_control(config: Config, revoked: Mapping[str, int]) -> dict[str, Any]
     }
 
 
-def _names_without_rights(config: Config, revoked: Mapping[str, int]) -> Iterator[str]:
-    """Common names of revoked certificates, and of those of a larger team of the same authority."""
-    roll = {who.name for who in team_roll(config)}
-    for name, last in revoked.items():
-        yield from (common_name(name, k) for k in range(1, last + 1))
-    robots = robot_names(_MOST_ROBOTS)
-    for name in (SIM, *robots, *map(plant_name, robots)):
-        if name not in roll:
-            yield from valid_names(name, 0)
-
-
 def _published(who: Identity, team: str, robots: Sequence[str]) -> tuple[str, ...]:
     if who.role in _HEARERS:
         return ()
-    if who.role == PROBE:
-        return tuple(f"{team}/{PROBE}/{name}" for name in _PROBED)
     return tuple(
         topic.key(team, name)
         for topic in TABLE
@@ -178,8 +140,6 @@ def _own_rules(rights: Rights, team: str) -> list[dict[str, Any]]:
     if rights.hears:
         rules.append(_rule(f"{name}-subscribes", ["declare_subscriber"], _IN, rights.hears))
         rules.append(_rule(f"{name}-hears", ["put"], _OUT, rights.hears))
-    if rights.identity.role == PROBE:
-        rules.append(_rule(f"{name}-deaf", ["declare_subscriber"], _IN, [f"{team}/{PROBE}/{DEAF}"]))
     return rules
 
 

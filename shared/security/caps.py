@@ -16,9 +16,7 @@ from math import prod
 from typing import Any, Final
 
 from quadriga.shared.config.sections import Config
-from quadriga.shared.members import PROBE
 from quadriga.shared.robot.conventions import robot_names
-from quadriga.shared.security.access import LARGE, MANY
 from quadriga.shared.security.roll import team_roll
 from quadriga.shared.wire.about import QUESTIONS
 from quadriga.shared.wire.codec import MAX_BYTES, MAX_TEXT
@@ -26,8 +24,6 @@ from quadriga.shared.wire.messages import Message
 from quadriga.shared.wire.topic import Topic
 from quadriga.shared.wire.topics import RECEIVED, TABLE
 
-PROBE_BYTES: Final = 64
-PROBE_HZ: Final = 0.1
 _MARGIN: Final = 200  # times the messages of real time
 _SPARE_SESSIONS: Final = 8  # for those who look on, and who has yet to be found dead
 # Greatest length of what has no fixed one, by its letter: samples, robots, yokes, plans, ticks.
@@ -77,7 +73,6 @@ def capacity(config: Config) -> dict[str, Any]:
 def _sizes(team: str) -> Iterable[dict[str, Any]]:
     for topic in TABLE:
         yield _size(topic.name, ["put"], topic.key(team, "*"), largest(topic.type))
-    yield _size("probe", ["put"], f"{team}/{PROBE}/{LARGE}", PROBE_BYTES)
     yield _size("receipts", ["query", "reply"], f"{team}/*/{RECEIVED}", _ANSWER)
     for question in QUESTIONS:
         limit = largest(question.type)
@@ -97,7 +92,6 @@ def _size(name: str, messages: list[str], key: str, limit: int) -> dict[str, Any
 
 def _rates(team: str, robots: Iterable[str]) -> Iterable[tuple[str, float]]:
     """Rates by key, one by one: Zenoh keeps one time for each rule, not for each key."""
-    yield f"{team}/{PROBE}/{MANY}", PROBE_HZ
     for topic in TABLE:
         rate = greatest_rate(topic)
         if rate:

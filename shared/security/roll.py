@@ -20,7 +20,6 @@ from quadriga.shared.members import (
     ESTOP,
     LAUNCHER,
     OBSERVER,
-    PROBE,
     RESET,
     RESUME,
     ROLES,
@@ -35,7 +34,7 @@ REVOKED: Final = "revoked.json"  # in the router's folder: by identity the last 
 # Certificates of one identity that are valid at a time; more are given only after a revocation.
 MOST_VALID: Final = 32
 _DIGITS: Final = 15  # of a certificate's number
-_OTHERS: Final = (LAUNCHER, ESTOP, STOP, RESET, RESUME, DOCTOR, OBSERVER, PROBE, ROUTER)
+_OTHERS: Final = (LAUNCHER, ESTOP, STOP, RESET, RESUME, DOCTOR, OBSERVER, ROUTER)
 _LOOKS_ON: Final = re.compile(r".+-\d+")  # such as echo-4711
 
 

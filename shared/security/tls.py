@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any, Final
 
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.members import PROBE, ROUTER
 from quadriga.shared.security.roll import identity_of, split_common_name
 
 AUTHORITY: Final = "authority.pem"
@@ -43,8 +42,8 @@ class TlsFiles:
 
 
 def identity_folder(certificates: Path, identity: str) -> Path:
-    """The folder of one identity; the probe's goes with the router's."""
-    return certificates / ROUTER / PROBE if identity == PROBE else certificates / identity
+    """The folder of one identity."""
+    return certificates / identity
 
 
 def tls_files(certificates: str, process: str) -> TlsFiles:

@@ -318,14 +318,3 @@ class Event(Message):
         if schema != 1 or not isinstance(kind, str) or not isinstance(detail, str):
             return None
         return {**body, "code": code_of_schema_1(kind, detail)}
-
-
-@record
-class Refusal(Message):
-    """What a router has not let through, of one sender on one key, since it told so last."""
-
-    who: str = plain(str, "common name of the sender's certificate, or where it came from")
-    action: str = plain(str, "what was refused, such as put or declare subscriber")
-    key: str = plain(str, "the key concerned, or empty")
-    reason: str = plain(str, "denied, revoked, large, often, expired, untrusted or full")
-    count: int = plain(int, "how many times")

@@ -10,7 +10,7 @@ from typing import Final
 
 from quadriga.shared import members
 from quadriga.shared.errors import MessageError
-from quadriga.shared.members import AGENT, LAUNCHER, OPERATOR, PLANNER, ROUTER, SIM
+from quadriga.shared.members import AGENT, LAUNCHER, OPERATOR, PLANNER, SIM
 from quadriga.shared.wire import messages as msg
 from quadriga.shared.wire.plugin_topics import plugin_topics
 from quadriga.shared.wire.topic import CONFIGURED as CONFIGURED
@@ -99,12 +99,9 @@ CLOCK_ANSWER: Final = Topic(
     "clock_answer", msg.ClockAnswer, (SIM,), (SIM,), per_robot=True, period_ms=0, repeats=True
 )
 
-# What a router has refused, if it has rules; the tick is the last of the clock that it heard.
-REFUSED: Final = Topic("refused", msg.Refusal, (ROUTER,), (), period_ms=0, repeats=True)
-
 _OWN: Final = (
     STATE, COMMAND, MEASUREMENT, PLAN, STATUS, INPUTS, REFERENCE, *WORDS, LIVE_FAULT, TRUTH,
-    EVENT, AGENT_EVENT, INJECTED, CLOCK, POSTURE, CLOCK_ASK, CLOCK_ANSWER, REFUSED,
+    EVENT, AGENT_EVENT, INJECTED, CLOCK, POSTURE, CLOCK_ASK, CLOCK_ANSWER,
 )  # fmt: skip
 TABLE: Final = (*_OWN, *plugin_topics(_OWN))
 _BY_NAME: Final = {topic.name: topic for topic in TABLE}

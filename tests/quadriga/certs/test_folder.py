@@ -20,7 +20,7 @@ from quadriga.shared.security.roll import MOST_VALID, read_numbers
 from quadriga.shared.security.tls import tls_files
 
 NOW = datetime(2026, 3, 1, 12, tzinfo=UTC)
-ROLL = ("r1", "r2", "operator", "probe", "router")
+ROLL = ("r1", "r2", "operator", "router")
 
 
 @pytest.fixture
@@ -47,7 +47,6 @@ def test_everybody_gets_what_its_process_needs(folder: CertificateFolder) -> Non
     for name in ROLL:
         files = tls_files(str(folder.path), name)
         assert files.authority.read_bytes() == (folder.path / "authority.pem").read_bytes()
-    assert tls_files(str(folder.path), "probe").key.parent.parent.name == "router"
 
 
 def test_nobody_but_the_owner_reads_a_key(folder: CertificateFolder) -> None:

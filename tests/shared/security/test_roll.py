@@ -27,7 +27,7 @@ def names(**keys: object) -> set[str]:
 
 def test_everybody_who_may_be_on_the_bus_is_on_the_roll() -> None:
     always = {"operator", "recorder", "planner", "launcher", "estop", "doctor"}
-    always |= {"stop", "reset", "resume", "observer", "probe", "router"}
+    always |= {"stop", "reset", "resume", "observer", "router"}
     assert names(team__robots=2) == {"sim", "r1", "r2", *always}
     assert names(team__robots=1, **EACH) == {"plant_r1", "r1", *always}
 

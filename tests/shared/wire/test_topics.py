@@ -115,7 +115,6 @@ def test_the_keys_are_the_contract_with_other_tools() -> None:
         "team/r1/posture",
         "team/r1/clock_ask",
         "team/r1/clock_answer",
-        "team/refused",
     ]
 
 
