@@ -23,7 +23,6 @@ from quadriga.shared.errors import BusError, ConfigError
 from quadriga.shared.members import DOCTOR, Member
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.runtime.installed import project_version
-from quadriga.shared.security.tls import tls_files
 from quadriga.shared.wire.about import About
 
 LINK: Final = "link"
@@ -96,6 +95,8 @@ def _lack_of_certificate(config: Config) -> Diagnosis | None:
     """Why the doctor cannot be let in, if it has no certificate here."""
     if not is_tls(config.bus.endpoint):
         return None
+    from quadriga.shared.security.certificates import tls_files
+
     try:
         tls_files(config.bus.certificates, DOCTOR)
     except ConfigError as error:

@@ -15,7 +15,7 @@ from quadriga.shared.errors import ConfigError
 from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.runtime.scheduling import take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
-from quadriga.team.router_rules import router_rules
+from quadriga.shared.security.access import router_rules
 
 _STAGES: Final = 3  # waits of the barrier: for the router, for everyone's presence, for readiness
 

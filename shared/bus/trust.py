@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Mapping
+from typing import Any
 
 from quadriga.shared.bus.reach import try_endpoint
 from quadriga.shared.bus.zenoh_settings import NO_LINK
 from quadriga.shared.config.endpoints import is_tls
 from quadriga.shared.config.sections import BusConfig
 from quadriga.shared.errors import BusError, QuadrigaError
-from quadriga.shared.security.handshake import CAUSES, TRUSTED, UNREACHABLE, shake_hands
-from quadriga.shared.security.tls import tls_files
 
-_GOT: Final = {UNREACHABLE: f"{NO_LINK}: "}
+
+def tls_of(bus: BusConfig, endpoint: str, name: str, *, listens: bool) -> Mapping[str, Any]:
+    """Settings of who shows certificates at an endpoint; none of another endpoint.
+
+    Raises:
+        ConfigError: a certificate is missing or cannot be used.
+    """
+    if not is_tls(endpoint):
+        return {}
+    from quadriga.shared.security.certificates import tls_files, tls_settings
+
+    return tls_settings(tls_files(bus.certificates, name), listens=listens)
 
 
 def check_trust(bus: BusConfig, name: str) -> None:
@@ -24,11 +34,14 @@ def check_trust(bus: BusConfig, name: str) -> None:
     """
     if not is_tls(bus.endpoint):
         return
+    from quadriga.shared.security.certificates import tls_files
+    from quadriga.shared.security.handshake import CAUSES, TRUSTED, UNREACHABLE, shake_hands
+
     found = shake_hands(bus.endpoint, tls_files(bus.certificates, name))
     if found.outcome != TRUSTED:
         raise BusError(
             f"bus.endpoint {bus.endpoint!r} of {name}",
-            f"{_GOT.get(found.outcome, f'{found.outcome}: ')}{found.detail}",
+            f"{NO_LINK if found.outcome == UNREACHABLE else found.outcome}: {found.detail}",
             "a router that is trusted and trusts this process",
             CAUSES[found.outcome],
         )

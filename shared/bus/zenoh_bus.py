@@ -18,7 +18,7 @@ from quadriga.shared.bus.newest import Newest
 from quadriga.shared.bus.presence import Presence
 from quadriga.shared.bus.router_wait import RouterWait
 from quadriga.shared.bus.standstill import Standstill
-from quadriga.shared.bus.trust import check_trust
+from quadriga.shared.bus.trust import check_trust, tls_of
 from quadriga.shared.bus.zenoh_settings import member_settings, opening_error, router_settings
 from quadriga.shared.bus.zenoh_threads import one_thread_receives, staying_attached
 from quadriga.shared.config.sections import BusConfig
@@ -87,7 +87,8 @@ class Bus:
                 is no router, or it and this process do not trust each other.
             KeyboardInterrupt: `stopped()` came before the router.
         """
-        settings, waits = member_settings(bus, name), RouterWait(bus, name, stopped, POLL)
+        settings = {**member_settings(bus, name), **tls_of(bus, bus.endpoint, name, listens=False)}
+        waits = RouterWait(bus, name, stopped, POLL)
         while True:
             try:
                 check_trust(bus, name)
@@ -137,7 +138,10 @@ class Bus:
             ConfigError: the endpoint is open to others, or a certificate is missing.
             BusError: the endpoint is malformed, cannot be bound, or is already in use.
         """
-        return cls(_open(router_settings(listen, bus or BusConfig(), rules), ROUTER), team, ROUTER)
+        bus = bus or BusConfig()
+        settings = router_settings(listen, bus, rules)
+        tls = tls_of(bus, listen, ROUTER, listens=True)
+        return cls(_open({**settings, **tls}, ROUTER), team, ROUTER)
 
     @property
     def linked(self) -> bool:

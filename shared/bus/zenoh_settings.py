@@ -9,8 +9,7 @@ from typing import Any, Final
 from quadriga.shared.config.endpoints import check_exposure, check_port, is_tls
 from quadriga.shared.config.sections import BusConfig
 from quadriga.shared.errors import BusError, ConfigError
-from quadriga.shared.members import LEADS, ROUTER
-from quadriga.shared.security.tls import tls_files, tls_settings
+from quadriga.shared.members import LEADS
 
 NO_LINK: Final = "Unable to connect"  # how Zenoh says that nobody answers at an endpoint
 LEASE_MS: Final = 10_000  # of silence after which a link is given up: its process stands still
@@ -56,7 +55,6 @@ def member_settings(bus: BusConfig, name: str, *, hub: bool = False) -> dict[str
     check_exposure(bus, "bus.endpoint", bus.endpoint)
     if peer:
         check_exposure(bus, "bus.listen", bus.listen)
-    secured = is_tls(bus.endpoint)
     hub = peer and (hub or name in LEADS)
     listen = [bus.endpoint] if hub else [bus.listen] if peer else []
     return {
@@ -68,7 +66,6 @@ def member_settings(bus: BusConfig, name: str, *, hub: bool = False) -> dict[str
         "connect/retry": _RETRY,
         "scouting/gossip/enabled": peer,
         **_COMMON,
-        **(tls_settings(tls_files(bus.certificates, name), listens=False) if secured else {}),
     }
 
 
@@ -85,14 +82,12 @@ def router_settings(listen: str, bus: BusConfig, rules: Mapping[str, Any]) -> di
     """
     check_port("--listen", listen)
     check_exposure(replace(bus, mode="client"), "--listen", listen)
-    secured = is_tls(listen)
     return {
         "mode": "router",
         "connect/endpoints": [],
         "listen/endpoints": [listen],
         "scouting/gossip/enabled": False,
         **_COMMON,
-        **(tls_settings(tls_files(bus.certificates, ROUTER), listens=True) if secured else {}),
         **rules,
     }
 

@@ -11,14 +11,14 @@ from pathlib import Path
 
 import zenoh
 
-from quadriga.certs.secured import secure
+from quadriga.certs.folder import secure
 from quadriga.shared.bus.zenoh_bus import Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.runtime.clock import utc_now
-from quadriga.shared.security.tls import TlsFiles, tls_files, tls_settings
+from quadriga.shared.security.access import router_rules
+from quadriga.shared.security.certificates import TlsFiles, tls_files, tls_settings
 from quadriga.team.endpoint import free_endpoint
-from quadriga.team.router_rules import router_rules
 
 WAIT = 20.0  # s, far more than anything here takes
 NOW = utc_now()

@@ -14,8 +14,8 @@ from quadriga.certs.folder import CertificateFolder
 from quadriga.doctor.examine import examine
 from quadriga.shared.bus.zenoh_bus import HERE, Bus
 from quadriga.shared.errors import BusError, ConfigError
-from quadriga.shared.security.caps import largest
-from quadriga.shared.security.tls import TlsFiles, tls_files
+from quadriga.shared.security.access import largest
+from quadriga.shared.security.certificates import TlsFiles, tls_files
 from quadriga.shared.wire.topics import COMMAND
 from tests.runtime.conftest import Make, Team
 from tests.runtime.fortress import LONG_AGO, NOW, WAIT, Fortress, make_fortress, serving, stranger

@@ -16,7 +16,7 @@ from quadriga.shared.config.write import to_toml
 from quadriga.shared.members import DOCTOR, LAST, ROUTER
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns
-from quadriga.shared.security.roll import team_roll
+from quadriga.shared.security.access import team_identities
 from quadriga.shared.wire.messages import Command
 from quadriga.team.launch import Launch, ProcessSpec
 from tests.deploy.test_compose import SERVICES, TEAM, resolve
@@ -62,7 +62,9 @@ def write_team(folder: Path, router: str) -> None:
     config = load(TEAM, keys)
     (folder / "team.toml").write_text(to_toml(config), encoding="utf-8")
     (folder / "health").mkdir()
-    certificates = CertificateFolder(folder / "certs", [who.name for who in team_roll(config)])
+    certificates = CertificateFolder(
+        folder / "certs", [who.name for who in team_identities(config)]
+    )
     now = datetime.fromtimestamp(1e-9 * wall_ns(), UTC)
     certificates.make(config.team.name, [router], now, 1.0)
 

@@ -1,20 +1,33 @@
-"""What is of interest of a certificate that somebody holds."""
+"""Certificates: what is of interest of one that somebody holds, and what Zenoh is told of it.
+
+The folder of certificates has one folder for each identity, which is all that its machine needs:
+the authority's certificate, its own, and its key.
+
+Imported only where there are certificates: `cryptography` takes 0.1 s.
+"""
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from cryptography import x509
 from cryptography.exceptions import InvalidSignature, UnsupportedAlgorithm
 from cryptography.x509.oid import NameOID
 
 from quadriga.shared.errors import ConfigError, name_file_errors
+from quadriga.shared.security.access import identity_of
+
+AUTHORITY: Final = "authority.pem"
+CERTIFICATE: Final = "certificate.pem"
+KEY: Final = "key.pem"
+OTHERS: Final = 0o077  # permissions of a file that others than its owner have
+_TLS: Final = "transport/link/tls"
 
 VALID: Final = "valid"
 NOT_YET_VALID: Final = "not yet valid"
@@ -132,3 +145,70 @@ def _hosts_of(found: x509.Certificate) -> tuple[str, ...]:
     except x509.ExtensionNotFound:
         return ()
     return tuple(str(name.value) for name in names)
+
+
+@dataclass(frozen=True, slots=True)
+class TlsFiles:
+    """What one process shows and trusts.
+
+    Attributes:
+        authority: certificate of who signs the team's.
+        certificate: the process's own.
+        key: its private key.
+    """
+
+    authority: Path
+    certificate: Path
+    key: Path
+
+    @classmethod
+    def within(cls, folder: Path) -> TlsFiles:
+        """Those in the folder of one identity."""
+        return cls(folder / AUTHORITY, folder / CERTIFICATE, folder / KEY)
+
+
+def tls_files(certificates: str, process: str) -> TlsFiles:
+    """The files of a process.
+
+    Args:
+        certificates: the folder of the configuration.
+        process: its name on the bus.
+
+    Raises:
+        ConfigError: one is missing or empty, others may read the key, or the certificate is
+            somebody else's.
+    """
+    identity = identity_of(process)
+    files = TlsFiles.within(Path(certificates).absolute() / identity)
+    copy = f"copy the folder {identity} to this machine"
+    for path in (files.authority, files.certificate, files.key):
+        if not path.is_file() or not path.stat().st_size:
+            got = "an empty file" if path.is_file() else "no such file"
+            cause = f"`quadriga certs make` makes it; {copy}"
+            raise ConfigError(str(path), got, f"the certificates of {identity}", cause)
+    if files.key.stat().st_mode & OTHERS:
+        mode = f"mode {files.key.stat().st_mode & 0o777:o}"
+        raise ConfigError(str(files.key), mode, "600", "others may read this private key")
+    name = read_certificate(files.certificate).name
+    if name != identity:  # the router would silently deny what it says
+        got, cause = f"the certificate of {name!r}", f"copied under another name? {copy}"
+        raise ConfigError(str(files.certificate), got, f"that of {identity}", cause)
+    return files
+
+
+def tls_settings(files: TlsFiles, *, listens: bool) -> Mapping[str, Any]:
+    """Zenoh's settings of who listens with these files, or of who connects.
+
+    Each shows its certificate and trusts only those of the authority. Who connects also expects
+    the address that it asked for in the listener's certificate.
+    """
+    side = "listen" if listens else "connect"
+    return {
+        "transport/link/protocols": ["tls"],
+        f"{_TLS}/root_ca_certificate": str(files.authority),
+        f"{_TLS}/{side}_certificate": str(files.certificate),
+        f"{_TLS}/{side}_private_key": str(files.key),
+        f"{_TLS}/enable_mtls": True,
+        f"{_TLS}/verify_name_on_connect": True,
+        f"{_TLS}/close_link_on_expiration": True,
+    }
