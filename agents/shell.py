@@ -12,10 +12,10 @@ from quadriga.agents.modes import Mode
 from quadriga.agents.planning.interface import NOTHING, Expected
 from quadriga.agents.step_io import Inputs, Outputs
 from quadriga.agents.telemetry import Telemetry
-from quadriga.shared.bus.barrier import join
-from quadriga.shared.bus.introduction import Introduction
-from quadriga.shared.bus.lead_watch import LeadWatch
-from quadriga.shared.bus.zenoh_bus import HERE, POLL, READY, Bus
+from quadriga.shared.bus.discovery import join
+from quadriga.shared.bus.liveness import Liveness
+from quadriga.shared.bus.process_info import ProcessInfo
+from quadriga.shared.bus.session import HERE, POLL, READY, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns
 from quadriga.shared.runtime.scheduling import at_work
@@ -92,7 +92,8 @@ def answer_states(
     with Bus.open(config.bus, config.team.name, agent.robot, stopped) as bus:
         for key in inbox.keys:
             bus.subscribe(key)
-        joined = join(bus, config, stopped, Introduction(bus, config, predictor_sha256))
+        info = ProcessInfo(bus, config, predictor_sha256)
+        joined = join(bus, config, stopped, info, rejoins=True)
         if not joined:
             return
         with interruptible(stopped):
@@ -117,7 +118,7 @@ class AgentShell(Generic[S]):
         self._put[AGENT_EVENT] = bus.publisher(AGENT_EVENT.key(team, agent.robot), urgent=realtime)
         self._telemetry = Telemetry(config.estimator.kind, paced=realtime)
         self._intake = Intake(config, inbox)
-        self._lead = LeadWatch(bus, config)
+        self._lead = Liveness(bus, config)
         self._given_up: dict[Source, int] = {}  # messages received of a source when given up
 
     def walk(self, stopped: Callable[[], bool]) -> None:
@@ -128,9 +129,9 @@ class AgentShell(Generic[S]):
             state = self._inbox.pop_state()
             if state is not None:
                 memory = self._answer(memory, state)
-                self._lead.hear()
+                self._lead.receive()
             else:
-                self._lead.look(memory.tick)
+                self._lead.poll(memory.tick)
 
     def _receive(self, timeout: float) -> bool:
         """Take in all that has come; False if nothing came within `timeout` seconds."""

@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from quadriga.shared.bus.zenoh_bus import HERE, READY, Arrival, Bus
+from quadriga.shared.bus.session import HERE, READY, Arrival, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import SIM
 from quadriga.shared.runtime.clock import monotonic_ns, sleep

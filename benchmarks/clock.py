@@ -19,8 +19,8 @@ from typing import Any, Final
 import numpy as np
 
 from benchmarks.children import SPAWN, child, running
-from quadriga.shared.bus.barrier import meet
-from quadriga.shared.bus.zenoh_bus import HERE, POLL, READY, Bus
+from quadriga.shared.bus.discovery import join
+from quadriga.shared.bus.session import HERE, POLL, READY, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
@@ -124,7 +124,7 @@ def _run_together(commands: Sequence[Sequence[str]], patience: float) -> None:
 def _member(config: Config, name: str) -> None:
     """Any other process of the team: it is there until the walk is over."""
     with Bus.open(config.bus, config.team.name, name) as bus:
-        if meet(bus, config, lambda: False):
+        if join(bus, config, lambda: False):
             bus.declare(READY)
         while has_lead(bus.members_at(HERE)):
             sleep(POLL)

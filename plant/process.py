@@ -14,9 +14,9 @@ from quadriga.plant.server import PlantServer
 from quadriga.plant.team_pace import TeamPace, team_pace
 from quadriga.plant.team_time import team_time
 from quadriga.plant.words import listen_to_estops, listen_to_words
-from quadriga.shared.bus.barrier import await_agents, meet, start_together
-from quadriga.shared.bus.lead_watch import Loss, loss_error
-from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.bus.discovery import await_agents, join, start_together
+from quadriga.shared.bus.liveness import Loss, loss_error
+from quadriga.shared.bus.session import Bus
 from quadriga.shared.config.sections import BRIDGED, Config
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.members import plant_name
@@ -68,7 +68,7 @@ def run(
         with interruptible(stopped):
             server = PlantServer(config, plant, bus, time, name)
         server.words = words
-        if not meet(bus, config, stopped):
+        if not join(bus, config, stopped):
             return
         end_collection()
         take_priority(config.runtime.priority)

@@ -11,7 +11,7 @@ from quadriga.plant.end import TOLD_TO_STOP, End
 from quadriga.plant.late import FRESH, HOLD, Lateness, hold_joints
 from quadriga.plant.server import PlantServer
 from quadriga.plant.team_pace import TeamPace
-from quadriga.shared.bus.zenoh_bus import HERE
+from quadriga.shared.bus.session import HERE
 from quadriga.shared.runtime.clock import Rate
 from quadriga.shared.wire import codes
 from quadriga.shared.wire.messages import Command, Status

@@ -11,8 +11,9 @@ from quadriga.plant.clock_estimate import WallReading
 from quadriga.plant.end import End
 from quadriga.plant.team_clock import ENOUGH_NS, FollowingClock, LeadingClock, TeamClock
 from quadriga.plant.team_time import plant_gone
-from quadriga.shared.bus.barrier import lead, start_together
-from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.bus.discovery import start_together
+from quadriga.shared.bus.membership import lead
+from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError, MessageError
 from quadriga.shared.members import has_lead, plant_name
@@ -108,10 +109,7 @@ class TeamPace(ABC):
         """Why the walk must end: a plant on which this one depends is silent."""
         silent = self.clock.silent(monotonic_ns())
         return (
-            plant_gone(
-                silent,
-                f"silent for {self._config.bus.clock_timeout:g} s{self._bus.standstill.note}",
-            )
+            plant_gone(silent, f"silent for {self._config.bus.clock_timeout:g} s")
             if silent
             else None
         )

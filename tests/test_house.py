@@ -15,7 +15,7 @@ import pytest
 TOP: Final = Path(__file__).parents[1]
 WALLS: Final = ("agents", "plant", "shared", "sim_server")
 ROOTS: Final = (*WALLS, "quadriga", "benchmarks")
-LONGEST_FILE: Final = 400
+LONGEST_FILE: Final = 700
 LONGEST_FUNCTION: Final = 60
 MOST_ARGUMENTS: Final = 8
 MOST_SKIPS: Final = 99  # matrices and tables that the formatter would tear apart

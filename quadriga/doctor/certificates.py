@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Final
 
-from quadriga.shared.bus.diagnosis import BAD, GOOD, NOTE, Diagnosis
+from quadriga.shared.bus.diagnostics import BAD, GOOD, NOTE, Diagnosis
 from quadriga.shared.security.certificates import EXPIRED, NOT_YET_VALID, Certificate
 
 CERTIFICATE: Final = "certificate"

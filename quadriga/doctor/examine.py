@@ -8,15 +8,23 @@ from quadriga.doctor.machine import check_machine, need_of
 from quadriga.doctor.readings import read_machine
 from quadriga.doctor.report import DoctorReport, MemberReport
 from quadriga.doctor.trust import look_at_certificates, try_certificate
-from quadriga.shared.bus.absence import DIFFERS, TeamView, diagnose
-from quadriga.shared.bus.agreement import REFUSED as DECISIVE
-from quadriga.shared.bus.agreement import disagreements
-from quadriga.shared.bus.diagnosis import BAD, GOOD, NOTE, UNKNOWN, Diagnosis
-from quadriga.shared.bus.inquiry import ask, pause, view_of
-from quadriga.shared.bus.introduction import describe_process
-from quadriga.shared.bus.reach import OPEN, REFUSED, UNTRIED, Reach, is_loopback, try_endpoint
-from quadriga.shared.bus.roster import members, processes
-from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.bus.diagnostics import (
+    BAD,
+    DECISIVE,
+    DIFFERS,
+    GOOD,
+    NOTE,
+    UNKNOWN,
+    Diagnosis,
+    TeamView,
+    diagnose,
+    disagreements,
+)
+from quadriga.shared.bus.discovery import ask, view_of
+from quadriga.shared.bus.endpoint import OPEN, REFUSED, UNTRIED, Reach, is_loopback, try_endpoint
+from quadriga.shared.bus.membership import members, processes
+from quadriga.shared.bus.process_info import describe_process
+from quadriga.shared.bus.session import HERE, Bus, pause
 from quadriga.shared.config.endpoints import is_tls
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError, ConfigError

@@ -11,8 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from quadriga.shared.bus.absence import CLOCK_OFF, NOT_REALTIME, TeamView, diagnose
-from quadriga.shared.bus.diagnosis import BAD
+from quadriga.shared.bus.diagnostics import BAD, CLOCK_OFF, NOT_REALTIME, TeamView, diagnose
 from quadriga.shared.members import DOCTOR, ROUTER, Member
 from quadriga.shared.wire.about import READY
 

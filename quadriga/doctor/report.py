@@ -7,8 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Final
 
-from quadriga.shared.bus.absence import MemberAnswer
-from quadriga.shared.bus.diagnosis import BAD, Diagnosis
+from quadriga.shared.bus.diagnostics import BAD, Diagnosis, MemberAnswer
 from quadriga.tables import align_columns
 
 FORMAT: Final = 1  # of the JSON; a field that is added does not change it

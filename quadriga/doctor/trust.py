@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from quadriga.doctor.certificates import HeldCertificate, check_certificates
-from quadriga.shared.bus.diagnosis import BAD, GOOD, Diagnosis
+from quadriga.shared.bus.diagnostics import BAD, GOOD, Diagnosis
 from quadriga.shared.config.endpoints import is_tls
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError, system_reason

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, Final, NamedTuple
 
 from quadriga.faults.table import with_result
-from quadriga.shared.bus.zenoh_settings import LEASE_MS
+from quadriga.shared.bus.settings import LEASE_MS
 from quadriga.shared.config.sections import Config
 from quadriga.tables import NOTHING, Table
 

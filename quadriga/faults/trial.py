@@ -20,8 +20,8 @@ from quadriga.faults.outcome import Moment, describe_outcome
 from quadriga.faults.teller import LEAD_MS, FaultTeller
 from quadriga.recordings.summary import RECORDING
 from quadriga.recordings.traces import read_traces
-from quadriga.shared.bus.lead_watch import missed_ns_of
-from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.bus.liveness import missed_ns_of
+from quadriga.shared.bus.session import Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.errors import ProcessError, RecordingError

@@ -12,7 +12,7 @@ from typing import Final
 
 from quadriga.recordings.key_patterns import KeyPattern, key_patterns
 from quadriga.recordings.readable import open_readable
-from quadriga.shared.bus.zenoh_bus import POLL, Bus
+from quadriga.shared.bus.session import POLL, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import RecordingError
 from quadriga.shared.recording.mcap_chunk import ChunkEntry

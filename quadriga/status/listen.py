@@ -11,11 +11,11 @@ from typing import Final
 
 from quadriga.doctor.health import Health, judge_team
 from quadriga.doctor.watch_team import WalkEnd
-from quadriga.shared.bus.absence import TeamView
-from quadriga.shared.bus.inquiry import ask, view_of
-from quadriga.shared.bus.introduction import describe_process
-from quadriga.shared.bus.roster import processes
-from quadriga.shared.bus.zenoh_bus import HERE, Arrival, Bus
+from quadriga.shared.bus.diagnostics import TeamView
+from quadriga.shared.bus.discovery import ask, view_of
+from quadriga.shared.bus.membership import processes
+from quadriga.shared.bus.process_info import describe_process
+from quadriga.shared.bus.session import HERE, Arrival, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
 from quadriga.shared.members import OBSERVER

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from quadriga.shared.bus.zenoh_bus import POLL, Bus
+from quadriga.shared.bus.session import POLL, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError, ConfigError, MessageError
 from quadriga.shared.members import LAUNCHER

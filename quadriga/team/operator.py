@@ -12,9 +12,9 @@ from quadriga.drive.client import socket_path
 from quadriga.drive.controls import DriveControls
 from quadriga.drive.server import DriveServer
 from quadriga.shared import members
-from quadriga.shared.bus.barrier import REJOINS, join
-from quadriga.shared.bus.lead_watch import LeadWatch
-from quadriga.shared.bus.zenoh_bus import POLL, READY, Bus
+from quadriga.shared.bus.discovery import REJOINS, join
+from quadriga.shared.bus.liveness import Liveness
+from quadriga.shared.bus.session import POLL, READY, Bus
 from quadriga.shared.config.reference import BY_HAND
 from quadriga.shared.config.reference_trace import trace_of
 from quadriga.shared.config.sections import Config
@@ -86,7 +86,7 @@ def run(config: Config, stopped: Callable[[], bool] | None = None, view: str = "
                 # The token drives the team, and this may be a log that others read.
                 page = server.url.partition("?")[0]
                 print(f"page to drive from: {page}; `quadriga drive` tells its token", flush=True)
-            joined = join(bus, config, stopped)
+            joined = join(bus, config, stopped, rejoins=True)
             if not joined:
                 return
             with at_work(config.runtime.priority):  # without a reference the robots stop
@@ -107,7 +107,7 @@ class _Operator:
         # more, as a frozen recorder, would hold up the router, and so everybody else.
         realtime = config.world.mode == "realtime"
         self._put = bus.publisher(REFERENCE.key(bus.team), droppable=realtime)
-        self._bus, self._watch = bus, LeadWatch(bus, config)
+        self._bus, self._watch = bus, Liveness(bus, config)
         self._time = TeamTicks(bus, round(1000 * config.world.seconds))
         controls.time = lambda: (self._time.tick, 1_000_000 * self._time.tick)
         self._controls = controls
@@ -144,9 +144,9 @@ class _Operator:
     def _follow(self) -> None:
         """Take in the team's time; see who is gone where there is none."""
         if self._time.follow(self._look):
-            self._watch.hear()
+            self._watch.receive()
         else:
-            self._watch.look(self._time.tick)
+            self._watch.poll(self._time.tick)
 
 
 class TeamTicks:

@@ -6,9 +6,9 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import Final
 
-from quadriga.shared.bus.barrier import lead
-from quadriga.shared.bus.zenoh_bus import POLL, READY, Bus
-from quadriga.shared.bus.zenoh_settings import link_settings
+from quadriga.shared.bus.membership import lead
+from quadriga.shared.bus.session import POLL, READY, Bus
+from quadriga.shared.bus.settings import link_settings
 from quadriga.shared.config.endpoints import is_tls
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Final, Self
 
-from quadriga.shared.bus.barrier import processes
-from quadriga.shared.bus.zenoh_bus import HERE, POLL, Bus
+from quadriga.shared.bus.membership import processes
+from quadriga.shared.bus.session import HERE, POLL, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError, MessageError
 from quadriga.shared.members import AGENT, SIM

@@ -20,10 +20,15 @@ from quadriga.drive.gamepad import EVENT_BYTES, Gamepad, take, wish_of
 from quadriga.drive.wish import standing
 from quadriga.plant.commands import CommandBox
 from quadriga.recordings.echo import format_entry
-from quadriga.shared.bus.absence import MemberAnswer, TeamView, describe_absent, diagnose
-from quadriga.shared.bus.agreement import TeamNorm
-from quadriga.shared.bus.inquiry import read_about
-from quadriga.shared.bus.introduction import describe_process
+from quadriga.shared.bus.diagnostics import (
+    MemberAnswer,
+    TeamNorm,
+    TeamView,
+    describe_absent,
+    diagnose,
+)
+from quadriga.shared.bus.discovery import read_about
+from quadriga.shared.bus.process_info import describe_process
 from quadriga.shared.config.load import load
 from quadriga.shared.errors import MessageError
 from quadriga.shared.members import SIM, team_members

@@ -12,8 +12,9 @@ import pytest
 from quadriga.plant import team_pace as module
 from quadriga.plant.team_clock import ENOUGH_NS
 from quadriga.plant.team_pace import FollowingPace, LeadingPace, team_pace
-from quadriga.shared.bus.barrier import meet, members
-from quadriga.shared.bus.zenoh_bus import READY, Bus
+from quadriga.shared.bus.discovery import join
+from quadriga.shared.bus.membership import members
+from quadriga.shared.bus.session import READY, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError
@@ -57,7 +58,7 @@ def pause() -> None:
 
 
 def all_meet(config: Config, buses: dict[str, Bus]) -> None:
-    threads = [Thread(target=meet, args=(bus, config, never)) for bus in buses.values()]
+    threads = [Thread(target=join, args=(bus, config, never)) for bus in buses.values()]
     for thread in threads:
         thread.start()
     for thread in threads:

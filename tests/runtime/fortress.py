@@ -12,7 +12,7 @@ from pathlib import Path
 import zenoh
 
 from quadriga.certs.folder import secure
-from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.bus.session import Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.runtime.clock import utc_now

@@ -10,8 +10,8 @@ import pytest
 
 from quadriga.commands.parser import main
 from quadriga.doctor import watch_team
-from quadriga.shared.bus.introduction import Introduction
-from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
+from quadriga.shared.bus.process_info import ProcessInfo
+from quadriga.shared.bus.session import HERE, READY, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.team.endpoint import free_endpoint
@@ -52,7 +52,7 @@ def test_files_say_who_is_healthy_until_the_walk_is_over(
         await_line(tmp_path / "router", "well")
         buses = {n: stack.enter_context(Bus.open(CONFIG.bus, "team", n)) for n in NAMES}
         for bus in buses.values():
-            Introduction(bus, CONFIG)
+            ProcessInfo(bus, CONFIG)
             bus.declare(HERE)
         await_line(tmp_path / "r1", "not well: here, waits for the others")
         for bus in buses.values():

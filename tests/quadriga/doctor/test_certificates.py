@@ -8,7 +8,7 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from quadriga.doctor.certificates import HeldCertificate, check_certificates
-from quadriga.shared.bus.diagnosis import BAD, GOOD, NOTE
+from quadriga.shared.bus.diagnostics import BAD, GOOD, NOTE
 from quadriga.shared.security.certificates import Certificate
 
 NOW = datetime(2026, 11, 26, tzinfo=UTC)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from quadriga.doctor.health import judge_team
-from quadriga.shared.bus.absence import TeamView
+from quadriga.shared.bus.diagnostics import TeamView
 from quadriga.shared.members import team_members
 from quadriga.shared.wire.about import HERE, REFUSED, WARMING_UP
 from tests.shared.bus.abouts import NAMES, SIM, about, answer, view

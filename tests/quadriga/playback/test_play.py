@@ -15,7 +15,7 @@ import pytest
 
 from quadriga.commands.parser import main
 from quadriga.playback.timeline import Timeline, parse_remap, rename
-from quadriga.shared.bus.zenoh_bus import HERE, Bus, Packet
+from quadriga.shared.bus.session import HERE, Bus, Packet
 from quadriga.shared.config.sections import BusConfig
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.members import SIM

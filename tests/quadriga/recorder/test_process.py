@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
+from quadriga.shared.bus.session import HERE, READY, Bus
 from quadriga.shared.config.sections import BusConfig, Config, TeamConfig
 from quadriga.shared.config.write import config_sha256, to_toml
 from quadriga.shared.members import OPERATOR, SIM

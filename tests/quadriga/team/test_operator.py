@@ -14,7 +14,7 @@ from rich.console import Console
 
 from quadriga.drive.driver_words import WHERE
 from quadriga.drive.find import open_link
-from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus, Packet
+from quadriga.shared.bus.session import HERE, READY, Bus, Packet
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError

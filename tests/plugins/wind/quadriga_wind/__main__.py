@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from quadriga.shared.bus.zenoh_bus import HERE, POLL, Bus
+from quadriga.shared.bus.session import HERE, POLL, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.errors import QuadrigaError
 from quadriga.shared.members import has_lead

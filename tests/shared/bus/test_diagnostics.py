@@ -6,8 +6,18 @@ from typing import Any
 
 import pytest
 
-from quadriga.shared.bus.absence import TeamView, describe_absent, diagnose
-from quadriga.shared.bus.diagnosis import BAD, GOOD, NOTE
+from quadriga.shared.bus.diagnostics import (
+    BAD,
+    GOOD,
+    NOTE,
+    TeamNorm,
+    TeamView,
+    describe_absent,
+    diagnose,
+    disagreements,
+    refuse,
+)
+from quadriga.shared.errors import BusError
 from quadriga.shared.members import Member, team_members
 from quadriga.shared.wire.about import About
 from tests.shared.bus.abouts import NAMES, SIM, about, answer, view
@@ -150,3 +160,81 @@ def test_a_controller_of_ones_own_need_not_answer() -> None:
     assert codes(r2, view(SIM, about("r1"), here=NAMES)) == [("foreign", NOTE)]
     absent = view(SIM, about("r1", sees=("sim",)), here=frozenset({"sim", "r1"}))
     assert [verdict for _, verdict in codes(r2, absent)] == [BAD], "but it must be there"
+
+
+NORM = TeamNorm(SIM, predictor="ab" * 32, planner="r1")
+
+
+def differences(**changes: Any) -> list[tuple[str, str, str, str]]:
+    said = disagreements(about("r2", **changes), NORM)
+    return [(item.of, item.got, item.wanted, item.owner) for item in said]
+
+
+def test_who_agrees_has_no_disagreement() -> None:
+    assert differences() == []
+    assert differences(predictor="ab" * 32) == []
+    assert differences(host="laptop", pid=9, stage="here", scheduling="realtime", sees=()) == []
+
+
+def test_each_key_that_differs_is_named_with_both_values() -> None:
+    config = ('team.name="team"', "world.seed=4", 'world.mode="realtime"')
+    assert differences(config=config) == [
+        (
+            "configuration",
+            'world.mode "realtime", world.seed 4',
+            'world.mode "lockstep", world.seed 5',
+            "sim",
+        )
+    ]
+
+
+def test_a_key_that_only_one_has_is_named_and_many_are_counted() -> None:
+    config = tuple(f"world.x{i}=1" for i in range(5))
+    ((_, got, wanted, _),) = differences(config=config)
+    assert got == "team.name unknown, world.mode unknown, world.seed unknown and 5 more"
+    assert wanted == 'team.name "team", world.mode "lockstep", world.seed 5 and 5 more'
+
+
+def test_a_topic_whose_messages_have_another_form_is_named_and_one_of_a_plugin_is_none() -> None:
+    said = ("state 5c", "command 00", "wind 11")
+    assert differences(messages=said) == [("messages", "command 00", "command 3f", "sim")]
+    with pytest.raises(BusError, match="messages of r2 in team 'team': got command 00"):
+        refuse("r2", "team", disagreements(about("r2", messages=said), NORM))
+
+
+def test_predictors_are_compared_with_the_first_that_plans_where_both_have_one() -> None:
+    assert differences(predictor="cd" * 32) == [("predictor", "cd" * 6, "ab" * 6, "r1")]
+    assert disagreements(about("r2", predictor="cd" * 32), TeamNorm(SIM)) == ()
+
+
+def test_of_another_version_nothing_else_is_compared() -> None:
+    assert differences(version="0.2.0", config=(), predictor="cd" * 32) == [
+        ("version", "0.2.0", "0.1.0", "sim")
+    ]
+    assert differences(version="") == [("version", "not installed", "0.1.0", "sim")]
+
+
+def test_other_code_or_libraries_are_no_reason_to_refuse() -> None:
+    said = disagreements(about("r2", code="fe" * 8, libraries=("python 3.12.1",)), NORM)
+    assert [item.of for item in said] == ["code", "libraries"]
+    assert said[1].got == "numpy unknown, python 3.12.1"
+    refuse("r2", "team", said)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        (
+            {"config": (*SIM.config[:1], "world.seed=4", SIM.config[2])},
+            "configuration of r2 in team 'team': got world.seed 4, "
+            "expected world.seed 5 as sim has it (all processes",
+        ),
+        ({"version": "9"}, "version of r2 in team 'team': got 9, expected 0.1.0 as sim has it"),
+        ({"predictor": "cd" * 32}, "predictor of r2 in team 'team': got cdcdcdcdcdcd, expected ab"),
+    ],
+)
+def test_a_refusal_names_what_differs(changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(BusError) as caught:
+        refuse("r2", "team", disagreements(about("r2", code="other", **changes), NORM))
+    assert str(caught.value).startswith(message)
+    assert "\n" not in str(caught.value)

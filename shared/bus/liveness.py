@@ -1,4 +1,4 @@
-"""Who drives the team's time may vanish without a word, and so may the link to the router."""
+"""The plant or the link to the router may disappear: when that ends a process, and its error."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from collections.abc import Callable
 from datetime import UTC, datetime
 from typing import Final, NamedTuple
 
-from quadriga.shared.bus.barrier import lead
-from quadriga.shared.bus.watch import say
-from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.bus.discovery import log
+from quadriga.shared.bus.membership import lead
+from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import waits_for_router
 from quadriga.shared.errors import ProcessError
@@ -18,7 +18,7 @@ from quadriga.shared.runtime.clock import monotonic, wall_ns
 from quadriga.shared.wire.codes import LEAD_GONE, LINK_LOST
 
 _MISSED: Final = re.compile(r", missed since (\S+Z),")
-LAST_WORDS: Final = 1.0  # s wall, in which what was sent before may still arrive
+LAST_PACKETS: Final = 1.0  # s wall, in which what was sent before may still arrive
 
 
 class Loss(NamedTuple):
@@ -45,14 +45,13 @@ def find_loss(bus: Bus, config: Config) -> Loss | None:
     return None
 
 
-def loss_error(loss: Loss, tick: int, missed_ns: int = 0, note: str = "") -> ProcessError:
+def loss_error(loss: Loss, tick: int, missed_ns: int = 0) -> ProcessError:
     """The error of a process that ends because of a loss.
 
     Args:
         loss: what has vanished.
         tick: the team's time as far as this process knows it, ms.
         missed_ns: when it was missed first, ns since 1970; 0: that is not known.
-        note: what this process has to say of itself, see `Standstill`.
     """
     cause = "killed, failed, or cut off: see what it says itself"
     if loss.code == LINK_LOST:
@@ -61,9 +60,7 @@ def loss_error(loss: Loss, tick: int, missed_ns: int = 0, note: str = "") -> Pro
     if missed_ns:
         moment = datetime.fromtimestamp(1e-9 * missed_ns, UTC)
         got += f", missed since {moment.isoformat(timespec='milliseconds')[:-6]}Z"
-    return ProcessError(
-        loss.what, got, "it to be there until the walk's announced end", cause + note
-    )
+    return ProcessError(loss.what, got, "it to be there until the walk's announced end", cause)
 
 
 def missed_ns_of(line: str) -> int:
@@ -73,14 +70,12 @@ def missed_ns_of(line: str) -> int:
         ns since 1970, to the ms.
     """
     found = _MISSED.search(line)
-    return (
-        0
-        if found is None
-        else 1_000_000 * round(1e3 * datetime.fromisoformat(found[1]).timestamp())
-    )
+    if found is None:
+        return 0
+    return 1_000_000 * round(1e3 * datetime.fromisoformat(found[1]).timestamp())
 
 
-class LossWatch:
+class LossTimer:
     """How long something is gone already, and whether it is gone for good.
 
     A router may be started again. Then each process finds it by itself, so that who drives time is
@@ -102,7 +97,7 @@ class LossWatch:
         self._patience = grace
         self.since: float | None = None
 
-    def look(self) -> Loss | None:
+    def poll(self) -> Loss | None:
         """What is gone for good; None if all is there, or may be back."""
         loss = self._find()
         if loss is None:
@@ -125,11 +120,11 @@ class LossWatch:
         self.since, self._patience = None, self._grace
 
 
-class LeadWatch:
+class Liveness:
     """Ends a process whose team is gone, and says what has vanished.
 
-    The last words of who drives time may arrive after its token has vanished, and they announce
-    the end of the walk. So a loss counts after `LAST_WORDS`, and that of a router as `LossWatch`
+    The last packets of who drives time may arrive after its token has vanished, and they announce
+    the end of the walk. So a loss counts after `LAST_PACKETS`, and that of a router as `LossTimer`
     tells.
 
     Args:
@@ -138,9 +133,9 @@ class LeadWatch:
     """
 
     def __init__(self, bus: Bus, config: Config) -> None:
-        self._watch = LossWatch(lambda: find_loss(bus, config), config, LAST_WORDS)
-        self._name, self._walks = bus.name, False
+        self._timer = LossTimer(lambda: find_loss(bus, config), config, LAST_PACKETS)
         self._bus, self._config = bus, config
+        self._walks = False
         self._silent_since: float | None = None  # since the end was announced
 
     def is_over(self, *, announced: bool) -> bool:
@@ -153,9 +148,9 @@ class LeadWatch:
         now = monotonic()
         if self._silent_since is None:
             self._silent_since = now
-        return now - self._silent_since >= LAST_WORDS or bool(find_loss(self._bus, self._config))
+        return now - self._silent_since >= LAST_PACKETS or bool(find_loss(self._bus, self._config))
 
-    def look(self, tick: int) -> None:
+    def poll(self, tick: int) -> None:
         """See whether the others are there; called while nothing arrives.
 
         Args:
@@ -164,16 +159,15 @@ class LeadWatch:
         Raises:
             ProcessError: who drives time, or the link to the router, is gone for good.
         """
-        loss = self._watch.look()
+        loss = self._timer.poll()
         if loss is not None:
-            note = self._bus.standstill.note
-            raise loss_error(loss, max(tick, 0), self._watch.missed_ns, note)
+            raise loss_error(loss, max(tick, 0), self._timer.missed_ns)
 
-    def hear(self) -> None:
+    def receive(self) -> None:
         """Something has arrived: the team walks, and who was gone is back."""
         self._silent_since = None
         if not self._walks:
             self._walks = True
-            say(f"{self._name}: the team walks")
-        if self._watch.since is not None:
-            self._watch.clear()
+            log(f"{self._bus.name}: the team walks")
+        if self._timer.since is not None:
+            self._timer.clear()

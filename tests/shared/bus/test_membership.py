@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from quadriga.shared.bus.presence import Presence
+from quadriga.shared.bus.membership import Presence
 
 
 def test_who_is_there_is_known_by_stage_until_the_token_vanishes() -> None:

@@ -6,7 +6,7 @@ import socket
 
 import pytest
 
-from quadriga.shared.bus.reach import is_loopback, split_endpoint, try_endpoint
+from quadriga.shared.bus.endpoint import is_loopback, split_endpoint, try_endpoint
 
 
 @pytest.mark.parametrize(

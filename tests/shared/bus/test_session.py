@@ -11,8 +11,8 @@ from contextlib import ExitStack
 
 import pytest
 
-from quadriga.shared.bus import router_wait
-from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
+from quadriga.shared.bus import session
+from quadriga.shared.bus.session import HERE, READY, Bus
 from quadriga.shared.config.sections import BusConfig
 from quadriga.shared.errors import BusError, ConfigError
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns
@@ -126,7 +126,7 @@ def test_what_was_sent_before_closing_arrives(opened: Open) -> None:
 
 FROZEN = """
 import sys
-from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.config.sections import BusConfig
 with Bus.open(BusConfig(endpoint=sys.argv[1]), "team", "r1") as bus:
     bus.subscribe("team/**")
@@ -138,7 +138,7 @@ with Bus.open(BusConfig(endpoint=sys.argv[1]), "team", "r1") as bus:
 
 LEAVES = """
 import sys
-from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.config.sections import BusConfig
 with Bus.open(BusConfig(endpoint=sys.argv[1]), "team", "sim") as bus:
     bus.declare(HERE)
@@ -318,7 +318,7 @@ def test_without_a_router_a_client_cannot_start(opened: Open) -> None:
 def test_who_waits_for_a_router_says_so_once(
     endpoint: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(router_wait, "_QUIET", 0.0)
+    monkeypatch.setattr(session, "_QUIET", 0.0)
     looks = iter([False, False, False, True])
     config = BusConfig(mode="client", endpoint=endpoint)
     with pytest.raises(KeyboardInterrupt):

@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import pytest
 
-from quadriga.shared.bus import lead_watch
-from quadriga.shared.bus.lead_watch import LeadWatch, Loss, find_loss, loss_error, missed_ns_of
-from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.bus import liveness
+from quadriga.shared.bus.liveness import Liveness, Loss, find_loss, loss_error, missed_ns_of
+from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ProcessError
@@ -24,7 +24,7 @@ WAIT = 20.0  # s
 
 @pytest.fixture(autouse=True)
 def _few_last_words(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(lead_watch, "LAST_WORDS", 0.2)
+    monkeypatch.setattr(liveness, "LAST_PACKETS", 0.2)
 
 
 def wait_until(condition: Callable[[], bool]) -> None:
@@ -44,12 +44,12 @@ def together(config: Config) -> Iterator[tuple[Bus, Bus]]:
         yield sim, r1
 
 
-def complaint(watch: LeadWatch, tick: int) -> tuple[str, float]:
+def complaint(watch: Liveness, tick: int) -> tuple[str, float]:
     """What is said in the end, and after how many seconds."""
     begun = monotonic()
     while monotonic() < begun + WAIT:
         try:
-            watch.look(tick)
+            watch.poll(tick)
         except ProcessError as error:
             return str(error), monotonic() - begun
         sleep(0.01)
@@ -59,8 +59,8 @@ def complaint(watch: LeadWatch, tick: int) -> tuple[str, float]:
 def test_who_drives_time_is_missed_after_its_last_words() -> None:
     config = load(None, {"bus.endpoint": free_endpoint()})
     with together(config) as (sim, r1):
-        watch = LeadWatch(r1, config)
-        watch.look(1)
+        watch = Liveness(r1, config)
+        watch.poll(1)
         assert find_loss(r1, config) is None
         left_ns = wall_ns()
         sim.close()
@@ -78,7 +78,7 @@ def test_who_drives_time_is_missed_after_its_last_words() -> None:
 def test_a_walk_is_over_once_who_announced_its_end_is_gone() -> None:
     config = load(None, {"bus.endpoint": free_endpoint()})
     with together(config) as (sim, r1):
-        watch = LeadWatch(r1, config)
+        watch = Liveness(r1, config)
         assert not watch.is_over(announced=False)
         assert not watch.is_over(announced=True)
         sim.close()
@@ -90,12 +90,12 @@ def test_a_walk_is_over_once_who_announced_its_end_is_gone() -> None:
 def test_a_walk_that_goes_on_is_not_over_whatever_is_announced() -> None:
     config = load(None, {"bus.endpoint": free_endpoint()})
     with together(config) as (_, r1):
-        watch = LeadWatch(r1, config)
+        watch = Liveness(r1, config)
         begun = monotonic()
         while monotonic() < begun + 0.6:
             assert not watch.is_over(announced=True)
             sleep(0.02)
-            watch.hear()
+            watch.receive()
         begun = monotonic()
         wait_until(lambda: watch.is_over(announced=True))
         assert monotonic() - begun >= 0.2
@@ -106,8 +106,8 @@ def test_a_link_that_is_gone_is_named_and_not_those_behind_it() -> None:
     router = Bus.route(config.bus.endpoint, "team")
     config = replace(config, bus=replace(config.bus, mode="client"))
     with together(config) as (_, r1):
-        watch = LeadWatch(r1, config)
-        watch.look(1)
+        watch = Liveness(r1, config)
+        watch.poll(1)
         router.close()
         wait_until(lambda: find_loss(r1, config) is not None)
         loss = find_loss(r1, config)
@@ -129,15 +129,15 @@ def test_a_router_that_is_started_again_is_waited_for() -> None:
     router = Bus.route(config.bus.endpoint, "team")
     with together(config) as (sim, r1):
         heard = r1.collect("team/clock")
-        watch = LeadWatch(r1, config)
+        watch = Liveness(r1, config)
         router.close()
         wait_until(lambda: find_loss(r1, config) is not None)
-        watch.look(1)
+        watch.poll(1)
         sleep(0.4)  # longer than last words
-        watch.look(2)
+        watch.poll(2)
         with Bus.route(config.bus.endpoint, "team"):
             wait_until(lambda: find_loss(r1, config) is None)
-            watch.look(3)
+            watch.poll(3)
             put = sim.publisher("team/clock")
             wait_until(lambda: put(b"12") or bool(heard()))
             assert SIM in r1.members_at(HERE)
@@ -150,7 +150,7 @@ def test_a_router_is_not_waited_for_where_that_is_no_use(keys: dict[str, object]
     config = routed(**keys)
     router = Bus.route(config.bus.endpoint, "team")
     with together(config) as (_, r1):
-        watch = LeadWatch(r1, config)
+        watch = Liveness(r1, config)
         router.close()
         wait_until(lambda: find_loss(r1, config) is not None)
         assert complaint(watch, 5)[1] < 5.0
@@ -159,13 +159,13 @@ def test_a_router_is_not_waited_for_where_that_is_no_use(keys: dict[str, object]
 def test_who_is_back_in_time_is_not_missed() -> None:
     config = load(None, {"bus.endpoint": free_endpoint()})
     with together(config) as (sim, r1):
-        watch = LeadWatch(r1, config)
+        watch = Liveness(r1, config)
         sim.withdraw()
         wait_until(lambda: not r1.members_at(HERE))
-        watch.look(1)
+        watch.poll(1)
         sim.declare(HERE)
         wait_until(lambda: SIM in r1.members_at(HERE))
-        watch.look(2)
+        watch.poll(2)
         sim.withdraw()
         wait_until(lambda: not r1.members_at(HERE))
         assert complaint(watch, 3)[1] >= 0.2

@@ -1,11 +1,12 @@
-"""What other threads put in and one thread takes out, waiting no longer than it says."""
+"""What other threads put in and one thread takes out: a bounded queue, and the newest of a key."""
 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from contextlib import suppress
 from threading import Lock
-from typing import Final, Generic, TypeVar
+from typing import Any, Final, Generic, NamedTuple, TypeVar
 
 from quadriga.shared.runtime.clock import monotonic
 
@@ -61,3 +62,34 @@ class Mailbox(Generic[Item]):
     def drain(self) -> list[Item]:
         """All items that are there, oldest first, without waiting."""
         return [self._items.popleft() for _ in range(len(self._items))]
+
+
+class Fresh(NamedTuple):
+    """What has come since the last poll.
+
+    Attributes:
+        messages: how many came; fewer than were sent, where more came than are kept.
+        payloads: the newest of them, oldest first.
+    """
+
+    messages: int
+    payloads: list[bytes]
+
+
+class Newest:
+    """The newest messages of a key, for whoever polls now and then and waits for none of them.
+
+    Args:
+        receive: gives the oldest message that is kept and forgets it; None: there is none.
+    """
+
+    def __init__(self, receive: Callable[[], Any]) -> None:
+        self._receive = receive
+
+    def take(self, wanted: int) -> Fresh:
+        """What has come since this was called last, with at most `wanted` payloads."""
+        count, newest = 0, deque[Any](maxlen=wanted)
+        while (sample := self._receive()) is not None:
+            count += 1
+            newest.append(sample)
+        return Fresh(count, [sample.payload.to_bytes() for sample in newest])

@@ -1,9 +1,10 @@
-"""The bus: publishers, one inbox and presence tokens over Zenoh. The only import of zenoh."""
+"""The bus: a session of Zenoh with publishers, one inbox, tokens. The only import of zenoh."""
 
 from __future__ import annotations
 
 import ctypes
 import json
+import sys
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import nullcontext, suppress
 from queue import SimpleQueue
@@ -12,14 +13,10 @@ from typing import Any, Final, Self
 
 import zenoh
 
-from quadriga.shared.bus.answers import Answers
-from quadriga.shared.bus.mailbox import INBOX, Mailbox
-from quadriga.shared.bus.newest import Newest
-from quadriga.shared.bus.presence import Presence
-from quadriga.shared.bus.router_wait import RouterWait
-from quadriga.shared.bus.standstill import Standstill
-from quadriga.shared.bus.trust import check_trust, tls_of
-from quadriga.shared.bus.zenoh_settings import member_settings, opening_error, router_settings
+from quadriga.shared.bus.endpoint import check_trust, tls_of
+from quadriga.shared.bus.membership import Presence
+from quadriga.shared.bus.ring_buffer import INBOX, Mailbox, Newest
+from quadriga.shared.bus.settings import NO_LINK, member_settings, opening_error, router_settings
 from quadriga.shared.bus.zenoh_threads import one_thread_receives, staying_attached
 from quadriga.shared.config.sections import BusConfig
 from quadriga.shared.errors import BusError
@@ -31,14 +28,43 @@ from quadriga.shared.wire.topics import RECEIVED
 
 Packet = tuple[str, bytes]  # key, payload as received
 Arrival = tuple[int, str, bytes]  # when, ns of `monotonic_ns`, and the packet
+Answer = tuple[int, str, bytes]  # when, ns of the wall clock, and key and payload
 
 POLL: Final = 0.05  # s, longest wait before a loop looks at its stop flag
 _ACK_TIMEOUT: Final = 2.0  # s
 _LINK_TIMEOUT: Final = 5.0  # s
+_QUIET: Final = 5.0  # s without a router that are not logged
 
 
-def _pause() -> None:
+def pause() -> None:
+    """Some milliseconds until the next look."""
     sleep(0.005)
+
+
+class Answers:
+    """The answers to one question; a thread that receives them fills it, another one reads it.
+
+    Attributes:
+        asked_ns: when the question was asked, by the wall clock.
+        over: whether nothing more will come: all who can answer have, or the time is over.
+    """
+
+    def __init__(self, asked_ns: int) -> None:
+        self.asked_ns = asked_ns
+        self.over = False
+        self._answers: SimpleQueue[Answer] = SimpleQueue()
+
+    def note(self, at_ns: int, key: str, payload: bytes) -> None:
+        """An answer has come."""
+        self._answers.put((at_ns, key, payload))
+
+    def end(self) -> None:
+        """Nothing more will come."""
+        self.over = True
+
+    def take(self) -> list[Answer]:
+        """All that has come since this was called last, oldest first."""
+        return [self._answers.get_nowait() for _ in range(self._answers.qsize())]
 
 
 class Bus:
@@ -58,7 +84,7 @@ class Bus:
         self._me = str(session.info.zid())
         self._inbox: Mailbox[zenoh.Sample] = Mailbox(INBOX)
         self._oversized: SimpleQueue[None] = SimpleQueue()  # counts what several threads drop
-        self._presence, self.standstill = Presence(self._me), Standstill()
+        self._presence = Presence(self._me)
         self._declared: dict[str, zenoh.LivelinessToken] = {}
         self._closed = False
         tokens, ack = f"{team}/*/*/*", f"{team}/{name}/{RECEIVED}"
@@ -88,13 +114,22 @@ class Bus:
             KeyboardInterrupt: `stopped()` came before the router.
         """
         settings = {**member_settings(bus, name), **tls_of(bus, bus.endpoint, name, listens=False)}
-        waits = RouterWait(bus, name, stopped, POLL)
+        begun, logged = monotonic(), False
         while True:
             try:
                 check_trust(bus, name)
                 return cls(_open(settings, name), team, name)
             except BusError as error:
-                waits.go_on(error)
+                waited = monotonic() - begun
+                if stopped is None or NO_LINK not in error.got or waited > bus.barrier_timeout:
+                    raise
+                if stopped():
+                    raise KeyboardInterrupt from None
+                if waited > _QUIET and not logged:
+                    logged = True
+                    text = f"quadriga: {name} waits for a router at {bus.endpoint}"
+                    print(text, file=sys.stderr, flush=True)
+                sleep(POLL)
 
     @classmethod
     def join(cls, bus: BusConfig, team: str, name: str) -> Self:
@@ -113,7 +148,7 @@ class Bus:
         joined = cls.open(bus, team, name)
         deadline = monotonic() + _LINK_TIMEOUT
         while not joined.linked and monotonic() < deadline:
-            sleep(0.005)
+            pause()
         return joined
 
     @classmethod
@@ -248,22 +283,17 @@ class Bus:
 
     def get(self, timeout: float) -> Packet | None:
         """The oldest packet of the inbox, waiting at most `timeout` seconds for one."""
-        self.standstill.look()
         sample = self._inbox.take(timeout)
-        self.standstill.look()
         return None if sample is None else _packet(sample)
 
     def drain(self) -> list[Packet]:
         """Everything in the inbox, oldest first, without waiting."""
-        self.standstill.look()
         return [_packet(sample) for sample in self._inbox.drain()]
 
     def declare(self, stage: str) -> None:
         """Tell everyone that this process has reached `stage`; again has no effect."""
         if stage in self._declared:
             return
-        if stage == READY:
-            self.standstill.begin()
         key = f"{self.team}/{self.name}/{stage}/{self._me}"
         self._declared[stage] = self._session.liveliness().declare_token(key)
 
@@ -291,27 +321,31 @@ class Bus:
         names: Iterable[str],
         timeout: float,
         stopped: Callable[[], bool],
-        pause: Callable[[], None] = _pause,
+        wait: Callable[[], None] = pause,
         explain: Callable[[frozenset[str]], str] | None = None,
     ) -> bool:
         """Wait until all `names` are at `stage`; False if `stopped()` came first.
 
-        Between two looks `pause()` is called, which takes some milliseconds. `explain()` tells at
+        Between two looks `wait()` is called, which takes some milliseconds. `explain()` tells at
         the end why some are absent.
 
         Raises:
             BusError: some were still absent after `timeout` seconds; the message names them.
         """
         wanted = frozenset(names) - {self.name}
-        absent = self._presence.await_all(stage, wanted, timeout, stopped, pause)
-        if absent:
-            raise BusError(
-                f"barrier of team {self.team!r}, seen by {self.name}",
-                f"no {', '.join(sorted(absent))} at stage {stage!r} after {timeout:g} s",
-                f"{', '.join(sorted(wanted))}",
-                explain(absent) if explain else self._likely_cause(),
-            )
-        return absent is not None
+        deadline = monotonic() + timeout
+        while absent := wanted - self._presence.at(stage):
+            if stopped():
+                return False
+            if monotonic() > deadline:
+                raise BusError(
+                    f"barrier of team {self.team!r}, seen by {self.name}",
+                    f"no {', '.join(sorted(absent))} at stage {stage!r} after {timeout:g} s",
+                    f"{', '.join(sorted(wanted))}",
+                    explain(absent) if explain else self._likely_cause(),
+                )
+            wait()
+        return True
 
     def close(self) -> None:
         """Leave the network once the others have received what this process published.

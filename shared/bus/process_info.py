@@ -7,7 +7,7 @@ import socket
 from dataclasses import replace
 from typing import Final
 
-from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.config.agreed import agreed_keys
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import RECORDER
@@ -26,7 +26,7 @@ from quadriga.shared.wire.schema import message_forms
 _NO_LIBRARY: Final = ("machine", PROJECT)
 
 
-class Introduction:
+class ProcessInfo:
     """Answers from now on, also while this process waits or walks, with how it is at that moment.
 
     Args:

@@ -1,16 +1,20 @@
-"""Why a member of a team is not there, or not as it should be: from tokens and answers."""
+"""Who of a team is missing, who is not as it should be, and why: from tokens and answers. Pure."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
-from quadriga.shared.bus.agreement import REFUSED, REMEDIES, TeamNorm, disagreements
-from quadriga.shared.bus.diagnosis import BAD, GOOD, NOTE, Diagnosis
+from quadriga.shared.errors import BusError
 from quadriga.shared.members import SIM, Member
 from quadriga.shared.wire.about import HERE, READY, STAGES, STARTED, WARMING_UP, About
 from quadriga.shared.wire.about import REFUSED as NOT_GRANTED
+
+GOOD: Final = "good"
+NOTE: Final = "note"  # worth knowing, and nothing is wrong
+BAD: Final = "bad"
+UNKNOWN: Final = "unknown"  # it could not be looked at
 
 NOT_STARTED: Final = "not-started"
 NO_LINK: Final = "no-link"
@@ -19,18 +23,80 @@ FOREIGN: Final = "foreign"
 NOT_REACHABLE: Final = "not-reachable"
 UNREADABLE: Final = "unreadable"
 TWO_OF_A_NAME: Final = "two-of-a-name"
-DIFFERS: Final = "other-"  # and what: `other-configuration`, see `shared.bus.agreement`
+DIFFERS: Final = "other-"  # and what: `other-configuration`
 CLOCK_OFF: Final = "clock-off"
 NOT_SEEN: Final = "not-seen"
 NOT_REALTIME: Final = "not-realtime"
 
 CLOCK_LIMIT: Final = 0.1  # s, by which wall clocks may differ: recordings are read by them
+# In what processes may differ, in the order in which it is told, and what to do about it.
+REMEDIES: Final[Mapping[str, str]] = {
+    "version": "install the same version of quadriga on all computers",
+    "messages": "the versions are the same and the messages are not: install the same files",
+    "configuration": "all processes of a team read the same file: copy it, give the same options",
+    "predictor": "copy the predictor's file and name it with --predictor, or fit both by the same "
+    "code",
+    "code": "the versions are the same and the source files are not: update both",
+    "libraries": "the last digits of plans may differ; requirements.lock has the versions",
+}
+DECISIVE: Final = frozenset(("version", "messages", "configuration", "predictor"))
+_SHOWN: Final = 3  # keys or libraries that are named
+_DIGITS: Final = 12  # of a digest
 _STAGES: Final = {
     STARTED: (NOTE, "on the bus, has not announced itself yet"),
     HERE: (NOTE, "here, waits for the others"),
     WARMING_UP: (NOTE, "still warming up"),
     READY: (GOOD, "ready"),
 }
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosis:
+    """What came of one look at a process or a computer.
+
+    Attributes:
+        code: what was found or looked at, for programs.
+        verdict: `GOOD`, `NOTE`, `BAD` or `UNKNOWN`.
+        text: the same in words.
+        remedy: what to do about it; "": nothing.
+    """
+
+    code: str
+    verdict: str
+    text: str
+    remedy: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class TeamNorm:
+    """What all must agree with.
+
+    Attributes:
+        lead: what the process that drives the team's time says of itself.
+        predictor: digest of the predictor of the first process that plans; "": unknown.
+        planner: the name of that process.
+    """
+
+    lead: About
+    predictor: str = ""
+    planner: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Disagreement:
+    """In what one process differs.
+
+    Attributes:
+        of: a key of `REMEDIES`; no team walks with those of `DECISIVE`.
+        got: what it has.
+        wanted: what it should have.
+        owner: the process that has this.
+    """
+
+    of: str
+    got: str
+    wanted: str
+    owner: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,8 +130,8 @@ class TeamView:
         linked: whether it is linked to anybody at all.
         here: names of those that have announced themselves.
         doubled: names that two processes carry.
-        answers: what was said, by name; processes of one name answer each.
         names: all that the team should have.
+        answers: what was said, by name; processes of one name answer each.
         norm: what all must agree with; None: unknown.
     """
 
@@ -101,6 +167,62 @@ def describe_absent(absent: Collection[Member], view: TeamView) -> str:
     return "; ".join(f"{', '.join(names)}: {reason}" for reason, names in by_reason.items())
 
 
+def disagreements(process: About, norm: TeamNorm) -> tuple[Disagreement, ...]:
+    """In what a process differs from the others; of another version nothing else is compared."""
+    lead = norm.lead
+    if process.version != lead.version:
+        got, wanted = process.version or "not installed", lead.version or "not installed"
+        return (Disagreement("version", got, wanted, lead.name),)
+    found = list[Disagreement]()
+    own, its = _by_name(process.messages, " "), _by_name(lead.messages, " ")
+    shared = own.keys() & its.keys()  # topics of a plug-in need not be known to all
+    for of, mine, theirs in (
+        ("messages", {n: own[n] for n in shared}, {n: its[n] for n in shared}),
+        ("configuration", _by_name(process.config, "="), _by_name(lead.config, "=")),
+        ("libraries", _by_name(process.libraries, " "), _by_name(lead.libraries, " ")),
+    ):
+        names = [name for name in sorted({*mine, *theirs}) if mine.get(name) != theirs.get(name)]
+        if names:
+            got, wanted = _name_values(names, mine), _name_values(names, theirs)
+            found.append(Disagreement(of, got, wanted, lead.name))
+    if process.predictor and norm.predictor and process.predictor != norm.predictor:
+        got, wanted = process.predictor[:_DIGITS], norm.predictor[:_DIGITS]
+        found.append(Disagreement("predictor", got, wanted, norm.planner))
+    if process.code != lead.code:
+        found.append(Disagreement("code", process.code, lead.code, lead.name))
+    return tuple(sorted(found, key=lambda item: list(REMEDIES).index(item.of)))
+
+
+def refuse(name: str, team: str, found: Iterable[Disagreement]) -> None:
+    """Refuse a process that differs in what no team walks with.
+
+    Args:
+        name: the process.
+        team: the team's name.
+        found: in what it differs.
+
+    Raises:
+        BusError: it does; the message names what, for instance the keys of the configuration.
+    """
+    for item in found:
+        if item.of in DECISIVE:
+            expected = f"{item.wanted} as {item.owner} has it"
+            what = f"{item.of} of {name} in team {team!r}"
+            raise BusError(what, item.got, expected, REMEDIES[item.of])
+
+
+def _by_name(lines: Iterable[str], separator: str) -> dict[str, str]:
+    split = (line.partition(separator) for line in lines)
+    return {name: value for name, _, value in split}
+
+
+def _name_values(names: list[str], values: Mapping[str, str]) -> str:
+    """Some of the values, with their names, and how many more there are."""
+    named = [f"{name} {values.get(name, 'unknown')}" for name in names[:_SHOWN]]
+    more = len(names) - len(named)
+    return ", ".join(named) + (f" and {more} more" if more else "")
+
+
 def _explain_silence(member: Member, view: TeamView) -> Diagnosis:
     name = member.name
     if view.answers.get(name):
@@ -111,7 +233,8 @@ def _explain_silence(member: Member, view: TeamView) -> Diagnosis:
             return Diagnosis(FOREIGN, NOTE, "here, a controller of one's own that answers nothing")
         cause = "frozen or overloaded, or an earlier version of quadriga: see its log, restart it"
         return Diagnosis(NOT_ANSWERING, BAD, "here, but does not answer", cause)
-    witnesses = sorted(other for other in view.answers if name in _sees(view.about(other)))
+    abouts = ((other, view.about(other)) for other in view.answers)
+    witnesses = sorted(other for other, about in abouts if about and name in about.sees)
     if witnesses:
         text = f"seen by {', '.join(witnesses)}, but not from here"
         cause = "frozen, or in peer mode its bus.listen cannot be reached from here"
@@ -119,28 +242,19 @@ def _explain_silence(member: Member, view: TeamView) -> Diagnosis:
     if not view.linked:
         return Diagnosis(NO_LINK, BAD, "no link to anyone")  # the way there is another matter
     text = "not on the bus: not started, failed, or another bus.endpoint or team.name"
-    cause = f"start it ({_command_of(member)}), or look at what it said"
-    return Diagnosis(NOT_STARTED, BAD, text, cause)
-
-
-def _command_of(member: Member) -> str:
     robot = f" --robot {member.robot}" if member.robot else ""
     real = ", of a real robot `bridge`" if member.role.name == SIM else ""
-    return f"`quadriga {member.role.command}{robot}`{real}"
-
-
-def _sees(about: About | None) -> Collection[str]:
-    return () if about is None else about.sees
+    command = f"`quadriga {member.role.command}{robot}`{real}"
+    return Diagnosis(NOT_STARTED, BAD, text, f"start it ({command}), or look at what it said")
 
 
 def _two_of_a_name(name: str, view: TeamView) -> Iterator[Diagnosis]:
-    answers = view.answers.get(name, ())
-    said = [answer.about for answer in answers if answer.about is not None]
-    members = [about for about in said if about.stage != STARTED]  # a late recorder is none
-    if name not in view.doubled and len(members) < 2:
+    said = [answer.about for answer in view.answers.get(name, ()) if answer.about is not None]
+    announced = [about for about in said if about.stage != STARTED]  # a late recorder is none
+    if name not in view.doubled and len(announced) < 2:
         return
-    where = " and ".join(f"{about.host}:{about.pid}" for about in members)
-    text = f"two processes of this name{f', {where}' if len(members) > 1 else ''}"
+    where = " and ".join(f"{about.host}:{about.pid}" for about in announced)
+    text = f"two processes of this name{f', {where}' if len(announced) > 1 else ''}"
     yield Diagnosis(TWO_OF_A_NAME, BAD, text, "stop one of them, or give one team another name")
 
 
@@ -161,7 +275,7 @@ def _explain_stage(about: About, view: TeamView) -> Iterator[Diagnosis]:
 
 def _find_differences(about: About, view: TeamView) -> Iterator[Diagnosis]:
     for item in disagreements(about, view.norm) if view.norm else ():
-        verdict = BAD if item.of in REFUSED else NOTE
+        verdict = BAD if item.of in DECISIVE else NOTE
         text = f"another {item.of}: {item.got}, {item.owner} has {item.wanted}"
         yield Diagnosis(f"{DIFFERS}{item.of}", verdict, text, REMEDIES[item.of])
     for answer in view.answers[about.name]:
