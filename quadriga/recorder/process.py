@@ -21,8 +21,8 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
 from quadriga.shared.errors import ProcessError, RecordingError, system_reason
 from quadriga.shared.members import RECORDER, has_lead
-from quadriga.shared.recording.admission import LARGEST, Admission
-from quadriga.shared.recording.writer import END
+from quadriga.shared.recording.metadata import END
+from quadriga.shared.recording.quota import LARGEST, Quota
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.runtime.scheduling import precede_ordinary, take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
@@ -43,7 +43,7 @@ class RecordedFiles:
         paths: the files.
         messages: how many are in them.
         lost: by key, messages that did not come.
-        refused: by reason, messages that were not stored, see `Admission`.
+        refused: by reason, messages that were not stored, see `Quota`.
         error: what vanished while the team walked; None: the walk's end was announced, or the team
             walks on without this recorder.
     """
@@ -135,7 +135,7 @@ def _open_parts(
         config.recorder.chunk_kib,
         periods(config),
         selection.limits,
-        admission=Admission(keys.own.__contains__),
+        quota=Quota(keys.own.__contains__),
     )
 
 
@@ -157,7 +157,7 @@ def _subscribe(bus: Bus, keys: KeyFilter) -> None:
 
 def _list_files(parts: Parts, ending: ProcessError | None) -> RecordedFiles:
     return RecordedFiles(
-        tuple(parts.paths), parts.messages, parts.count_lost(), parts.admission.refused, ending
+        tuple(parts.paths), parts.messages, parts.count_lost(), parts.quota.refused, ending
     )
 
 

@@ -14,9 +14,9 @@ from quadriga.shared.bus.session import Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
 from quadriga.shared.members import PLANNER, plant_name
-from quadriga.shared.recording.admission import OVERSIZED
-from quadriga.shared.recording.mcap_chunk import name_of
-from quadriga.shared.recording.passed_over import PassedOver
+from quadriga.shared.recording.quota import OVERSIZED
+from quadriga.shared.recording.reader import name_of
+from quadriga.shared.recording.ticks import SkippedTicks
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.clock import log_ns, monotonic, sleep
 from quadriga.shared.runtime.scheduling import take_priority
@@ -60,7 +60,7 @@ class Session:
         self._flushed = self._begun = monotonic()
         self._ended = self._seen = self._announced = self._drops = False
         self._hurries = config.world.mode == "lockstep"  # then it does from the start
-        self._passed_over = PassedOver(config)
+        self._passed_over = SkippedTicks(config)
         self._losses = LossTimer(lambda: find_loss(bus, config), config, grace=0.0)
 
     def record(self, *, late: bool, seen: bool) -> None:
@@ -119,7 +119,7 @@ class Session:
             some = self._take(QUIET)
             if not some and (self.find_unannounced() is None or monotonic() > begun + LAST_PACKETS):
                 break
-        self._parts.admission.refused[OVERSIZED] += self._bus.oversized
+        self._parts.quota.refused[OVERSIZED] += self._bus.oversized
         if self._bus.dropped:
             self._say(f"{self._bus.dropped:,} messages were dropped before they were recorded")
 
@@ -145,7 +145,7 @@ class Session:
                 if key == self._event_key:
                     self._note_event(payload)
                 elif passed := self._passed_over.find(key, payload):
-                    self._parts.pass_over(*passed)
+                    self._parts.skip(*passed)
             self._tend()
         self._tend()
         return bool(packets)

@@ -15,7 +15,7 @@ from quadriga.recordings.readable import open_readable
 from quadriga.shared.bus.session import POLL, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import RecordingError
-from quadriga.shared.recording.mcap_chunk import ChunkEntry
+from quadriga.shared.recording.reader import ChunkEntry
 from quadriga.shared.runtime.clock import log_ns, monotonic
 from quadriga.shared.wire.envelope import envelope
 

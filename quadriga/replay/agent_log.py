@@ -14,8 +14,7 @@ from quadriga.agents.teammates import concerns_agents
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import RecordingError
 from quadriga.shared.planner_kinds import find_kind
-from quadriga.shared.recording.mcap_chunk import ChunkEntry
-from quadriga.shared.recording.reader import Recording
+from quadriga.shared.recording.reader import ChunkEntry, Recording
 from quadriga.shared.wire.messages import Consumed, Event
 from quadriga.shared.wire.topics import (
     COMMAND,

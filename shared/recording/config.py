@@ -15,7 +15,7 @@ from quadriga.shared.errors import ConfigError, RecordingError
 from quadriga.shared.planner_kinds import stand_in
 from quadriga.shared.printable import printable_line
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.recording.salvage import Salvage
+from quadriga.shared.recording.recover import DamagedRecording
 from quadriga.shared.robot.robots import ROBOTS
 
 PLUGIN: Final = (
@@ -23,7 +23,7 @@ PLUGIN: Final = (
 )
 
 
-def recorded_config(recording: Recording | Salvage) -> Config:
+def recorded_config(recording: Recording | DamagedRecording) -> Config:
     """The configuration of a recorded run.
 
     What its version did not know yet is as it was then, see `with_older_values`. A planner, or a

@@ -33,7 +33,7 @@ from quadriga.shared.config.load import load
 from quadriga.shared.errors import MessageError
 from quadriga.shared.members import SIM, team_members
 from quadriga.shared.printable import printable_line
-from quadriga.shared.recording.mcap_chunk import ChunkEntry
+from quadriga.shared.recording.reader import ChunkEntry
 from quadriga.shared.wire.about import QUESTIONS, About
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.envelope import envelope

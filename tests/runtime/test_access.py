@@ -85,7 +85,7 @@ def test_a_foreign_key_is_refused(fortress: Fortress, recorder: Bus, thief: str,
         assert heard(fortress, recorder, session) == set()
 
 
-def test_who_is_let_in_hears_what_is_its_own_and_nothing_else(fortress: Fortress, recorder: Bus) -> None:
+def test_who_is_let_in_hears_what_is_its_own_alone(fortress: Fortress, recorder: Bus) -> None:
     with fortress.bus("sim") as sim, stranger(fortress, fortress.files("r2")) as session:
         stolen = [session.declare_subscriber(key) for key in ("**", "team/**", "team/*/state")]
         own = session.declare_subscriber("team/r2/state")

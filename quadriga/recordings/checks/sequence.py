@@ -9,7 +9,7 @@ from quadriga.recordings.checks.getting_up import Doubts, GettingUp
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import max_ages, periods
 from quadriga.shared.members import AGENT, PLANNER
-from quadriga.shared.recording.sequence import TickTrack
+from quadriga.shared.recording.ticks import TickTrack
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.wire.messages import Event, Plan, Status
 from quadriga.shared.wire.topics import COMMAND, MEASUREMENT, STATE, TABLE, WORDS

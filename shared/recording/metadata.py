@@ -1,4 +1,4 @@
-"""A recording's metadata as stored: with the version of the format and a checksum."""
+"""A recording's metadata: their names, and how they are stored, with a version and a checksum."""
 
 from __future__ import annotations
 
@@ -9,6 +9,12 @@ from typing import Final
 
 from quadriga.shared.errors import NewerRecordingError, RecordingError
 
+RECORDING: Final = "run.mcap"  # in a run folder
+PROFILE: Final = "quadriga"  # of the file, and the name of what its writer was given
+COUNTS: Final = f"{PROFILE}.counts"  # written at the end: what the writer counted
+LOST: Final = f"{PROFILE}.lost"  # by key, messages that did not come
+SINCE: Final = f"{PROFILE}.since"  # by key, tick of its first message
+END: Final = f"{PROFILE}.end"  # code, detail and tick of an end that nobody announced
 FORMAT: Final = 1  # of the recordings that this version writes
 _FORMAT_KEY: Final = "format"
 _CRC_KEY: Final = "crc32"
@@ -36,7 +42,7 @@ def unseal(stored: Mapping[str, str], name: str) -> dict[str, str]:
             "metadata as they were written",
             "a damaged file: `quadriga recover` writes what is readable",
         )
-    version = values.pop(_FORMAT_KEY, "1")
+    version = values.pop(_FORMAT_KEY, str(FORMAT))
     if version != str(FORMAT):
         raise newer_format_error(name, f"a recording of format {version[:20]}", f"format {FORMAT}")
     return values

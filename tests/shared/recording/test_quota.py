@@ -6,17 +6,18 @@ from pathlib import Path
 
 import pytest
 
-from quadriga.shared.recording import admission
-from quadriga.shared.recording.admission import (
+from quadriga.shared.recording import quota
+from quadriga.shared.recording.metadata import COUNTS
+from quadriga.shared.recording.quota import (
     LARGEST,
     MAX_FOREIGN_KEYS,
     OVERSIZED,
     REFUSED,
-    Admission,
+    Quota,
     describe_refused,
 )
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.recording.writer import COUNTS, RecordingWriter
+from quadriga.shared.recording.writer import RecordingWriter
 from quadriga.shared.wire.codec import encode
 from tests.shared.recording.test_reader import METADATA, state
 
@@ -25,7 +26,7 @@ OWN = "team/r1/state"
 
 def writer_of(path: Path) -> RecordingWriter:
     """Of a team of one robot."""
-    return RecordingWriter(path, METADATA, admission=Admission({OWN}.__contains__))
+    return RecordingWriter(path, METADATA, quota=Quota({OWN}.__contains__))
 
 
 def test_keys_of_others_without_end_keep_no_own_message_out(tmp_path: Path) -> None:
@@ -47,14 +48,14 @@ def test_keys_of_others_without_end_keep_no_own_message_out(tmp_path: Path) -> N
 def test_bytes_of_others_without_end_keep_no_own_message_out(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(admission, "MAX_FOREIGN_BYTES", 100_000)
+    monkeypatch.setattr(quota, "MAX_FOREIGN_BYTES", 100_000)
     with writer_of(tmp_path / "run.mcap") as writer:
         for tick in range(150):
             writer.write("team/flood", bytes(1000), 0)
             writer.write(OWN, encode(state(tick)), 0)
     keys = [entry.key for entry in Recording(tmp_path / "run.mcap").entries()]
     assert (keys.count("team/flood"), keys.count(OWN)) == (100, 150)
-    assert writer.admission.refused == {OVERSIZED: 0, REFUSED: 50}
+    assert writer.quota.refused == {OVERSIZED: 0, REFUSED: 50}
 
 
 @pytest.mark.parametrize("key", [OWN, "team/flood"])
@@ -71,13 +72,13 @@ def test_what_is_too_large_to_be_a_message_is_counted(tmp_path: Path, key: str) 
 def test_a_key_as_long_as_a_book_is_refused(tmp_path: Path) -> None:
     with writer_of(tmp_path / "run.mcap") as writer:
         writer.write(f"team/{'x' * 60_000}", b"", 0)
-    assert writer.admission.refused[REFUSED] == 1
+    assert writer.quota.refused[REFUSED] == 1
 
 
 def test_keys_of_others_count_in_all_files_of_a_recording(tmp_path: Path) -> None:
-    common = Admission({OWN}.__contains__)
+    common = Quota({OWN}.__contains__)
     for part in range(2):
-        with RecordingWriter(tmp_path / f"{part}.mcap", METADATA, admission=common) as writer:
+        with RecordingWriter(tmp_path / f"{part}.mcap", METADATA, quota=common) as writer:
             for k in range(3000):
                 writer.write(f"team/flood/{3000 * part + k}", b"", 0)
             writer.write("team/flood/0", b"", 0)

@@ -15,16 +15,20 @@ MAX_FOREIGN_KEYS: Final = 4096
 MAX_FOREIGN_BYTES: Final = 1 << 28
 LONGEST_KEY: Final = 1024  # characters; those of this project have 100 at most
 
-# Reasons for which a message is not stored, as they are noted in a recording.
+# Reasons for which a message is not stored, as they are noted in a recording, and in words.
 OVERSIZED: Final = "oversized"
 REFUSED: Final = "refused"
+_REASONS: Final[Mapping[str, str]] = {
+    OVERSIZED: f"of more than {LARGEST >> 20} MiB",
+    REFUSED: "of keys that are not the team's, beyond what is stored of such",
+}
 
 
 def _is_of_table(key: str) -> bool:
     return find_topic(key)[0] is not None
 
 
-class Admission:
+class Quota:
     """Decides of each message whether it is stored, and counts those that are not.
 
     Args:
@@ -43,7 +47,7 @@ class Admission:
         self.is_own, self._largest = is_own, largest
         self._foreign: set[str] = set()
         self._bytes = 0  # of what others sent
-        self.refused: Counter[str] = Counter({OVERSIZED: 0, REFUSED: 0})
+        self.refused: Counter[str] = Counter(dict.fromkeys(_REASONS, 0))
 
     def admits_key(self, key: str, known: int) -> bool:
         """Whether there is room for a key in a file that has `known` of them; counts if not."""
@@ -76,12 +80,5 @@ class Admission:
 
 def describe_refused(refused: Mapping[str, int]) -> list[str]:
     """What was not stored, in words, a line for each reason; [] if all was."""
-    words = {
-        OVERSIZED: f"of more than {LARGEST >> 20} MiB",
-        REFUSED: "of keys that are not the team's, beyond what is stored of such",
-    }
-    return [
-        f"{refused[reason]:,} messages {why}"
-        for reason, why in words.items()
-        if refused.get(reason)
-    ]
+    told = ((refused.get(reason, 0), why) for reason, why in _REASONS.items())
+    return [f"{count:,} messages {why}" for count, why in told if count]
