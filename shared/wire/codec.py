@@ -78,9 +78,6 @@ def decode(payload: bytes, kind: type[M]) -> M:
     if not isinstance(body, dict):
         raise _error(kind, type(body).__name__, "a MessagePack map", "a foreign publisher?")
     schema = body.pop("schema", None)
-    if type(schema) is int and schema < kind.SCHEMA:
-        earlier = kind.upgrade(schema, body)
-        schema, body = (schema, body) if earlier is None else (kind.SCHEMA, earlier)
     if schema != kind.SCHEMA or isinstance(schema, bool):
         raise _error(
             kind,

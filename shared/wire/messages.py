@@ -17,7 +17,7 @@ import numpy as np
 
 from quadriga.shared.robot.conventions import OUTPUTS, Array
 from quadriga.shared.runtime.record import record
-from quadriga.shared.wire.codes import EVENTS, code_of_schema_1
+from quadriga.shared.wire.codes import EVENTS
 from quadriga.shared.wire.entries import FORCES, JOINTS, LEGS, ONE, WXYZ, XYZ
 
 Dim = int | str
@@ -45,11 +45,6 @@ class Message:
     SCHEMA: ClassVar[int] = 1
     tick: int = plain(int, "world time of the content [ms]")
     stamp_ns: int = plain(int, "world time of the content [ns]")
-
-    @classmethod
-    def upgrade(cls, schema: int, body: dict[str, Any]) -> dict[str, Any] | None:
-        """Fields of a message of an earlier schema as today's has them; None: not readable."""
-        return None
 
 
 class Flat(Message):
@@ -295,10 +290,7 @@ class ClockAnswer(Message):
 
 @record
 class Event(Message):
-    """Something happened in the world.
-
-    Of schema 1, which had no `code`, recordings are still read.
-    """
+    """Something happened in the world."""
 
     SCHEMA = 2
     kind: str = plain(str, "push, payload, terrain, bridge, fault, fall, start or stop")
@@ -310,11 +302,3 @@ class Event(Message):
     def of(cls, tick: int, code: str, robot: str, detail: str) -> Event:
         """The announcement of something that happened at `tick`, by its code."""
         return cls(tick, tick * 1_000_000, EVENTS[code].kind, robot, detail, code)
-
-    @classmethod
-    def upgrade(cls, schema: int, body: dict[str, Any]) -> dict[str, Any] | None:
-        """Fields of an event of schema 1, with its code."""
-        kind, detail = body.get("kind"), body.get("detail")
-        if schema != 1 or not isinstance(kind, str) or not isinstance(detail, str):
-            return None
-        return {**body, "code": code_of_schema_1(kind, detail)}
