@@ -19,8 +19,7 @@ from quadriga.shared.members import SIM
 from quadriga.shared.runtime.clock import monotonic_ns, sleep
 from quadriga.shared.runtime.scheduling import take_priority
 from quadriga.shared.runtime.signals import die_with_parent
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.envelope import envelope
+from quadriga.shared.wire.codec import encode, envelope
 from quadriga.shared.wire.messages import Measurement, Plan
 from quadriga.shared.wire.topics import MEASUREMENT, PLAN, SAMPLE_MS
 

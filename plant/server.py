@@ -24,8 +24,15 @@ from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.wire import codes
 from quadriga.shared.wire.codec import encode, truncate_text
-from quadriga.shared.wire.event_line import format_event
-from quadriga.shared.wire.messages import Clock, Command, Event, Reset, SafeStop, Status
+from quadriga.shared.wire.messages import (
+    Clock,
+    Command,
+    Event,
+    Reset,
+    SafeStop,
+    Status,
+    format_event,
+)
 from quadriga.shared.wire.topics import CLOCK, EVENT, POSTURE, STATE, STATUS, TRUTH
 
 _TOLD_AFTER: Final = 5.0  # s; a process looks for a router that is gone at least every 4 s

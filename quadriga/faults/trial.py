@@ -30,7 +30,7 @@ from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.atomic import write_text
 from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns
 from quadriga.shared.runtime.scheduling import go_first, leave_priority
-from quadriga.shared.wire.event_line import parse_events
+from quadriga.shared.wire.messages import parse_events
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import Launch, process_table, router_row
 from quadriga.team.run_folder import CONFIG

@@ -21,7 +21,7 @@ from quadriga.shared.config.timing import periods
 from quadriga.shared.members import OBSERVER
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns, sleep
 from quadriga.shared.runtime.process_use import read_use
-from quadriga.shared.wire.envelope import envelope
+from quadriga.shared.wire.codec import envelope
 from quadriga.shared.wire.topics import TABLE
 from quadriga.status.gather import StatusFold
 from quadriga.status.judge import find_problems

@@ -10,9 +10,8 @@ from quadriga.shared.errors import BusError, ConfigError, MessageError
 from quadriga.shared.members import LAUNCHER
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic
-from quadriga.shared.wire.codec import decode, encode
+from quadriga.shared.wire.codec import decode, encode, envelope
 from quadriga.shared.wire.codes import FAULT_ASKED, FAULT_REFUSED
-from quadriga.shared.wire.envelope import envelope
 from quadriga.shared.wire.messages import Event, LiveFault
 from quadriga.shared.wire.topics import CLOCK, EVENT, LIVE_FAULT
 from quadriga.sim_server.world.faults.components import build_components

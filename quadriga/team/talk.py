@@ -13,8 +13,7 @@ from quadriga.shared.errors import BusError, MessageError
 from quadriga.shared.members import AGENT, SIM
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic
-from quadriga.shared.wire.codec import decode, encode
-from quadriga.shared.wire.envelope import envelope
+from quadriga.shared.wire.codec import decode, encode, envelope
 from quadriga.shared.wire.messages import Event, Message, Status
 from quadriga.shared.wire.topic import Topic
 from quadriga.shared.wire.topics import EVENT, STATUS, topics_for

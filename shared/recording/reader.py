@@ -27,8 +27,7 @@ from mcap.writer import MCAP0_MAGIC
 
 from quadriga.shared.errors import RecordingError, name_file_errors
 from quadriga.shared.recording.metadata import PROFILE, newer_format_error, unseal
-from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.envelope import envelope
+from quadriga.shared.wire.codec import decode, envelope
 from quadriga.shared.wire.messages import Message
 from quadriga.shared.wire.topics import TABLE, find_topic, topic_of
 

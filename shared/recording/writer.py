@@ -39,7 +39,7 @@ from quadriga.shared.errors import RecordingError, system_reason
 from quadriga.shared.recording.metadata import COUNTS, LOST, PROFILE, SINCE, seal
 from quadriga.shared.recording.quota import Quota
 from quadriga.shared.recording.ticks import TickTrack, lost_by_key
-from quadriga.shared.wire.envelope import envelope
+from quadriga.shared.wire.codec import envelope
 from quadriga.shared.wire.schema import json_schema
 from quadriga.shared.wire.topics import TABLE, Topic, find_topic
 

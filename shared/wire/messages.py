@@ -7,18 +7,27 @@ Every message carries `tick` (1 ms of world time) and `stamp_ns` (the world's ti
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from functools import partial
 from itertools import accumulate
-from typing import Any, ClassVar, Self, TypeVar, dataclass_transform
+from typing import Any, ClassVar, Final, Self, TypeVar, dataclass_transform
 
 import numpy as np
 
-from quadriga.shared.robot.conventions import OUTPUTS, Array
+from quadriga.shared.printable import printable_line
+from quadriga.shared.robot.conventions import JOINT_NAMES, OUTPUTS, Array, Leg
 from quadriga.shared.runtime.record import record
 from quadriga.shared.wire.codes import EVENTS
-from quadriga.shared.wire.entries import FORCES, JOINTS, LEGS, ONE, WXYZ, XYZ
+
+# Names of the entries of arrays, for readers that know nothing of this project.
+XYZ: Final = ("x", "y", "z")
+WXYZ: Final = ("w", "x", "y", "z")
+LEGS: Final = tuple(leg.name for leg in Leg)
+JOINTS: Final = tuple(name.removesuffix("_joint") for name in JOINT_NAMES)
+FORCES: Final = tuple(f"{leg}.{axis}" for leg in LEGS for axis in XYZ)
+ONE: Final = ("",)  # a single number, called as its field is
 
 Dim = int | str
 F = TypeVar("F", bound="Flat")
@@ -302,3 +311,19 @@ class Event(Message):
     def of(cls, tick: int, code: str, robot: str, detail: str) -> Event:
         """The announcement of something that happened at `tick`, by its code."""
         return cls(tick, tick * 1_000_000, EVENTS[code].kind, robot, detail, code)
+
+
+_LINE: Final = re.compile(r"(\d+) ms: (\S+) (\S*) (.*)")  # of an event in a log
+
+
+def format_event(event: Event) -> str:
+    """The line of an event: its tick, its code, the robot concerned or nothing, and its detail."""
+    return printable_line(f"{event.tick} ms: {event.code} {event.robot} {event.detail}")
+
+
+def parse_events(lines: Iterable[str]) -> Iterator[Event]:
+    """The events of a log; lines that are none are left out."""
+    for line in lines:
+        match = _LINE.fullmatch(line.rstrip("\n"))
+        if match is not None and match[2] in EVENTS:
+            yield Event.of(int(match[1]), match[2], match[3], match[4])

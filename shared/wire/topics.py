@@ -12,9 +12,9 @@ from quadriga.shared import members
 from quadriga.shared.errors import MessageError
 from quadriga.shared.members import AGENT, LAUNCHER, OPERATOR, PLANNER, SIM
 from quadriga.shared.wire import messages as msg
-from quadriga.shared.wire.plugin_topics import plugin_topics
 from quadriga.shared.wire.topic import CONFIGURED as CONFIGURED
 from quadriga.shared.wire.topic import Topic as Topic
+from quadriga.shared.wire.topic import plugin_topics
 
 SAMPLE_MS: Final = 10  # one sample of u and y: forces are means over it, outputs taken at its end
 REFERENCE_EPOCH_MS: Final = 100  # the operator speaks at multiples of this

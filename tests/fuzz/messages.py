@@ -35,8 +35,7 @@ from quadriga.shared.members import SIM, team_members
 from quadriga.shared.printable import printable_line
 from quadriga.shared.recording.reader import ChunkEntry
 from quadriga.shared.wire.about import QUESTIONS, About
-from quadriga.shared.wire.codec import decode, encode
-from quadriga.shared.wire.envelope import envelope
+from quadriga.shared.wire.codec import decode, encode, envelope
 from quadriga.shared.wire.messages import LiveFault
 from quadriga.shared.wire.topics import TABLE
 from quadriga.sim_server.world.faults.components import build_components

@@ -21,7 +21,7 @@ from quadriga.shared.errors import ConfigError
 from quadriga.shared.members import SIM
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.runtime.clock import monotonic
-from quadriga.shared.wire.envelope import envelope
+from quadriga.shared.wire.codec import envelope
 from quadriga.team.endpoint import free_endpoint
 from tests.listening import WAIT
 from tests.quadriga.lockstep_run import TICKS, config, write_lockstep

@@ -15,8 +15,7 @@ from quadriga.shared.config.load import load
 from quadriga.shared.errors import QuadrigaError
 from quadriga.shared.members import has_lead
 from quadriga.shared.runtime.clock import sleep
-from quadriga.shared.wire.codec import decode, encode
-from quadriga.shared.wire.envelope import envelope
+from quadriga.shared.wire.codec import decode, encode, envelope
 from quadriga.shared.wire.messages import Event
 from quadriga.shared.wire.topics import EVENT, TRUTH
 

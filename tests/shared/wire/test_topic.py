@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.wire.plugin_topics import plugin_topics
+from quadriga.shared.wire.topic import plugin_topics
 from quadriga.shared.wire.topics import TABLE
 
 HEAD = """
