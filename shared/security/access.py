@@ -4,12 +4,9 @@ A certificate's common name is the identity of its process. Whatever is not perm
 Seen from the router, what a process sends comes in (`ingress`) and what it hears goes out
 (`egress`).
 
-A message that is larger or comes sooner than permitted is dropped before anybody decodes it. A
-rate has no burst in Zenoh: it is the least time between two messages, and the newer one is dropped.
-What a slow link or a busy processor has held up comes at once: at 10,000 in a second up to one in
-300 of a team's own messages was dropped in real time. So only messages of every tick have a rate,
-no less than that at which a router passes messages on. All others are limited by their size, a stop
-by nothing else.
+A message that is larger than any of its type is dropped before anybody decodes it. No key has a
+rate: Zenoh's is the least time between two messages, without a burst, and what a slow link has held
+up comes at once. With ten times the rate of states up to one in 300 was dropped in real time.
 """
 
 from __future__ import annotations
@@ -47,7 +44,6 @@ _IN, _OUT, _BOTH = ["ingress"], ["egress"], ["ingress", "egress"]
 _HEARERS: Final = (RECORDER, OBSERVER, DOCTOR)  # they hear everything and say nothing
 _OF_LEAD: Final = (CLOCK, TRUTH, CLOCK_ANSWER)  # only who drives time knows
 
-_MARGIN: Final = 200  # times the messages of real time
 _SPARE_SESSIONS: Final = 8  # for those who look on, and who has yet to be found dead
 # Greatest length of what has no fixed one, by its letter: samples, robots, yokes, plans, ticks.
 _LENGTHS: Final = {"N": 100, "n": 10, "k": 45, "P": 1000, "K": 10_000}
@@ -120,7 +116,7 @@ def team_rights(config: Config) -> tuple[Rights, ...]:
 
 
 def router_rules(config: Config) -> dict[str, Any]:
-    """Zenoh's settings of a team's router: who may send and hear what, how much, how often."""
+    """Zenoh's settings of a team's router: who may send and hear what, and how much."""
     return {"access_control": access_control(config), **capacity(config)}
 
 
@@ -145,22 +141,14 @@ def access_control(config: Config) -> dict[str, Any]:
 
 def capacity(config: Config) -> dict[str, Any]:
     """Zenoh's settings of a router that let nobody take more than its share."""
-    team, robots = config.team.name, robot_names(config.team.robots)
+    team = config.team.name
     sizes = [_size(t.name, ["put"], t.key(team, "*"), largest(t.type)) for t in TABLE]
     sizes.append(_size("receipts", ["query", "reply"], f"{team}/*/{RECEIVED}", _ANSWER))
     sizes += [
         _size(q.name, ["query", "reply"], q.key(team, "*"), largest(q.type)) for q in QUESTIONS
     ]
-    # One by one: Zenoh keeps one time for each rule, not for each key.
-    rates = [
-        {"key_expr": topic.key(team, name), "freq": rate}
-        for topic in TABLE
-        if (rate := greatest_rate(topic))
-        for name in (robots if topic.per_robot else ("",))
-    ]
     return {
         "low_pass_filter": sizes,
-        "downsampling": [{"id": "rates", "flows": _IN, "messages": ["put"], "rules": rates}],
         "transport/unicast/max_sessions": len(team_identities(config)) + _SPARE_SESSIONS,
         "transport/unicast/max_links": 1,  # the rules do not see a second link of a session
         "transport/link/rx/max_message_size": MAX_BYTES,
@@ -176,11 +164,6 @@ def largest(kind: type[Message]) -> int:
         size = _array(meta["shape"]) if "shape" in meta else sizes[meta["kind"]]
         total += len(item.name) + _FRAME + size
     return min(total, MAX_BYTES)
-
-
-def greatest_rate(topic: Topic) -> float:
-    """Messages of one key in a second above which they are dropped; 0: no limit."""
-    return _MARGIN * 1000.0 if topic.period_ms == 1 else 0.0
 
 
 def questions_of(team: str) -> list[str]:
