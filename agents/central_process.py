@@ -16,10 +16,10 @@ from quadriga.agents.planning.team import Central, CentralOutputs, CentralState
 from quadriga.agents.plausibility import is_within_limits
 from quadriga.agents.rehearsal import rehearse_central
 from quadriga.agents.time_grid import step_ms
-from quadriga.shared.bus.barrier import meet
-from quadriga.shared.bus.introduction import Introduction
-from quadriga.shared.bus.lead_watch import LeadWatch
-from quadriga.shared.bus.zenoh_bus import POLL, READY, Bus
+from quadriga.shared.bus.discovery import join
+from quadriga.shared.bus.liveness import Liveness
+from quadriga.shared.bus.process_info import ProcessInfo
+from quadriga.shared.bus.session import POLL, READY, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
 from quadriga.shared.members import PLANNER
@@ -66,7 +66,7 @@ def run(
             bus.subscribe(MEASUREMENT.key(team, name))
         bus.subscribe(REFERENCE.key(team))
         bus.subscribe(EVENT.key(team))
-        if not meet(bus, config, stopped, Introduction(bus, config, predictor_sha256)):
+        if not join(bus, config, stopped, ProcessInfo(bus, config, predictor_sha256)):
             return
         with interruptible(stopped):
             rehearse_central(config, Central(config, planner))
@@ -88,7 +88,7 @@ class _CentralShell:
             for name in self._robots.values()
         }
         self._tell = bus.publisher(STATUS.key(team, PLANNER), droppable=realtime)
-        self._lead = LeadWatch(bus, config)
+        self._lead = Liveness(bus, config)
         self._lockstep = not realtime
         self._references: list[Reference] = []
         self._measurements: list[tuple[str, Measurement]] = []
@@ -102,9 +102,9 @@ class _CentralShell:
         while not (stopped() or self._lead.is_over(announced=self._end.awaited)):
             packet = self._bus.get(POLL)
             if packet is None:
-                self._lead.look(self._tick)
+                self._lead.poll(self._tick)
             else:
-                self._lead.hear()
+                self._lead.receive()
             for key, payload in (packet, *self._bus.drain()) if packet else ():
                 self._take(key, payload)
             state = self._central.remember(state, self._measurements, self._references)

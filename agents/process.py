@@ -11,7 +11,7 @@ from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.predictor.store import predictor_sha256
 from quadriga.agents.shell import answer_states
 from quadriga.agents.tick_cost import rehearse_in_time
-from quadriga.shared.bus.barrier import STARTS
+from quadriga.shared.bus.discovery import STARTS
 from quadriga.shared.config.sections import Config
 from quadriga.shared.runtime.blas import use_one_blas_thread
 from quadriga.shared.runtime.clock import monotonic_ns

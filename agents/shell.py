@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Final, Generic, Protocol, TypeVar
+from typing import Generic, Protocol, TypeVar
 
 from quadriga.agents.healing import change_event
 from quadriga.agents.inbox.inbox import Inbox, Source
@@ -12,28 +12,17 @@ from quadriga.agents.modes import Mode
 from quadriga.agents.planning.interface import NOTHING, Expected
 from quadriga.agents.step_io import Inputs, Outputs
 from quadriga.agents.telemetry import Telemetry
-from quadriga.shared.bus.barrier import join
-from quadriga.shared.bus.introduction import Introduction
-from quadriga.shared.bus.lead_watch import LeadWatch
-from quadriga.shared.bus.zenoh_bus import HERE, POLL, READY, Bus
+from quadriga.shared.bus.discovery import join
+from quadriga.shared.bus.liveness import Liveness
+from quadriga.shared.bus.process_info import ProcessInfo
+from quadriga.shared.bus.session import HERE, POLL, READY, Bus
 from quadriga.shared.config.sections import Config
-from quadriga.shared.errors import BusError
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns
 from quadriga.shared.runtime.scheduling import at_work
 from quadriga.shared.runtime.signals import interruptible
 from quadriga.shared.wire.codec import encode
 from quadriga.shared.wire.messages import State
-from quadriga.shared.wire.topics import (
-    AGENT_EVENT,
-    COMMAND,
-    INPUTS,
-    MEASUREMENT,
-    PLAN,
-    STATE,
-    STATUS,
-)
-
-_PATIENCE: Final = 3.0  # s of states none of which is newer; long before, the joints are damped
+from quadriga.shared.wire.topics import AGENT_EVENT, COMMAND, INPUTS, MEASUREMENT, PLAN, STATUS
 
 
 class RememberedTick(Protocol):
@@ -96,15 +85,15 @@ def answer_states(
 
     Raises:
         BusError: the bus cannot be opened, or the team is not complete in time, has something
-            else in common, or walks already in lock-step; or for 3 s no state has come that is
-            newer than those before.
+            else in common, or walks already in lock-step.
         ProcessError: who drives time, or the link to the router, has vanished.
         KeyboardInterrupt: it is stopped before it is ready.
     """
     with Bus.open(config.bus, config.team.name, agent.robot, stopped) as bus:
         for key in inbox.keys:
             bus.subscribe(key)
-        joined = join(bus, config, stopped, Introduction(bus, config, predictor_sha256))
+        info = ProcessInfo(bus, config, predictor_sha256)
+        joined = join(bus, config, stopped, info, rejoins=True)
         if not joined:
             return
         with interruptible(stopped):
@@ -129,9 +118,7 @@ class AgentShell(Generic[S]):
         self._put[AGENT_EVENT] = bus.publisher(AGENT_EVENT.key(team, agent.robot), urgent=realtime)
         self._telemetry = Telemetry(config.estimator.kind, paced=realtime)
         self._intake = Intake(config, inbox)
-        self._lead = LeadWatch(bus, config)
-        # Since the last answer: how many misfits there were when first noticed, and when.
-        self._misfits: tuple[int, float] | None = None
+        self._lead = Liveness(bus, config)
         self._given_up: dict[Source, int] = {}  # messages received of a source when given up
 
     def walk(self, stopped: Callable[[], bool]) -> None:
@@ -142,27 +129,9 @@ class AgentShell(Generic[S]):
             state = self._inbox.pop_state()
             if state is not None:
                 memory = self._answer(memory, state)
-                self._misfits = None
-                self._lead.hear()
+                self._lead.receive()
             else:
-                self._lead.look(memory.tick)
-                self._check_clock(memory.tick)
-
-    def _check_clock(self, tick: int) -> None:
-        """End where states go on coming but none is newer than `tick`: all would be ignored."""
-        count, now = self._inbox.misfits, monotonic()
-        if self._misfits is None:
-            self._misfits = (count, now) if count else None
-            return
-        before, since = self._misfits
-        if count > before and now - since > _PATIENCE:
-            raise BusError(
-                STATE.key(self._config.team.name, self._agent.robot),
-                f"{count} states within {now - since:.0f} s whose ticks do not go on",
-                f"ticks that rise from {tick} on",
-                "has the world's clock been set, or does someone else send states?"
-                f"{self._bus.standstill.note}",
-            )
+                self._lead.poll(memory.tick)
 
     def _receive(self, timeout: float) -> bool:
         """Take in all that has come; False if nothing came within `timeout` seconds."""

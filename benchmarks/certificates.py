@@ -19,7 +19,7 @@ from typing import Any, Final
 from rich.console import Console
 
 from benchmarks.realtime import late_commands
-from quadriga.certs.secured import secure
+from quadriga.certs.folder import secure
 from quadriga.identification.predictors import ensure_predictor
 from quadriga.recordings.summary import summarise
 from quadriga.shared.config.load import load

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.children import SPAWN, child, running
-from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
+from quadriga.shared.bus.session import HERE, READY, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml

@@ -15,8 +15,8 @@ from typing import Any
 
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
+from quadriga.shared.recording.metadata import RECORDING
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.recording.writer import RECORDING
 from quadriga.shared.runtime.clock import monotonic, wall_ns
 from quadriga.shared.wire.topics import STATE
 from quadriga.team.endpoint import free_endpoint

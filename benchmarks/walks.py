@@ -14,7 +14,7 @@ from quadriga.agents.agent import Agent, AgentState, Inputs, Outputs
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.predictor.store import predictor_sha256
 from quadriga.identification.rollout import Rollout
-from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.bus.session import Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from quadriga.plant.server import PlantServer
-from quadriga.shared.bus.zenoh_bus import HERE
+from quadriga.shared.bus.session import HERE
 from quadriga.shared.members import OPERATOR
 from quadriga.shared.wire import codes
 
@@ -42,8 +42,7 @@ def _note_operator(server: PlantServer, present: Collection[str]) -> None:
         return
     server.operator_gone = gone
     if gone:
-        gone_so = f"operator gone: no reference counts any more{server.bus.standstill.note}"
-        server.announce(codes.OPERATOR_GONE, "", gone_so)
+        server.announce(codes.OPERATOR_GONE, "", "operator gone: no reference counts any more")
     else:
         server.announce(codes.OPERATOR_BACK, "", "the operator is there again")
 

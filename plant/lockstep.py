@@ -8,7 +8,7 @@ from typing import Final
 from quadriga.plant.end import TOLD_TO_STOP, End
 from quadriga.plant.server import PlantServer
 from quadriga.plant.team_time import plant_gone
-from quadriga.shared.bus.zenoh_bus import HERE, POLL
+from quadriga.shared.bus.session import HERE, POLL
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.wire import codes
 from quadriga.shared.wire.messages import Command
@@ -36,15 +36,14 @@ def _commands(server: PlantServer, stopped: Callable[[], bool]) -> dict[str, Com
     waiting = set(server.plant.names) - server.silent
     alone = not waiting
     patience = _ALONE if alone else server.config.world.command_timeout
-    still = bus.standstill
-    deadline = monotonic() + patience - still.total  # the robots are not to blame for that
+    deadline = monotonic() + patience
     while (waiting or alone) and not stopped() and server.time.end is None:
-        left = deadline + still.total - monotonic()
-        if left <= 0.0:
+        left = deadline - monotonic()
+        packet = bus.get(min(max(left, 0.0), POLL))
+        if packet is None and left <= 0.0:  # this process may have stood still, not the robots
             silence = f"silent for {server.config.world.command_timeout:g} s"
             _give_up(server, waiting, codes.SILENT, silence)
             break
-        packet = bus.get(min(left, POLL))
         if packet is None:
             server.look_at_link()
             if server.time.end is not None:

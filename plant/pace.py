@@ -12,12 +12,11 @@ from dataclasses import replace
 from typing import Final
 
 from quadriga.plant.end import End
-from quadriga.shared.bus.absence import CLOCK_REMEDY, PACE_LIMIT, ClockOffset, MemberAnswer
-from quadriga.shared.bus.answers import Answers
-from quadriga.shared.bus.barrier import lead, start_together
-from quadriga.shared.bus.inquiry import ask, ask_clock, read_about
-from quadriga.shared.bus.introduction import Introduction
-from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.bus.diagnostics import CLOCK_REMEDY, PACE_LIMIT, ClockOffset, MemberAnswer
+from quadriga.shared.bus.discovery import ask, ask_clock, read_about, start_together
+from quadriga.shared.bus.membership import lead
+from quadriga.shared.bus.process_info import ProcessInfo
+from quadriga.shared.bus.session import HERE, Answers, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError
 from quadriga.shared.members import LEADS, has_lead
@@ -77,7 +76,7 @@ class TeamPace:
             compared last; None: this is that plant.
     """
 
-    def __init__(self, bus: Bus, config: Config, me: Introduction) -> None:
+    def __init__(self, bus: Bus, config: Config, me: ProcessInfo) -> None:
         self._bus, self._config, self._me = bus, config, me
         self._lead = "" if bus.name in LEADS else lead(config)
         self._clock, self._start = SystemClock(0), 0

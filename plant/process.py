@@ -14,10 +14,10 @@ from quadriga.plant.realtime import run_realtime
 from quadriga.plant.server import PlantServer
 from quadriga.plant.team_time import team_time
 from quadriga.plant.words import listen_to_estops, listen_to_words
-from quadriga.shared.bus.barrier import await_agents, meet, start_together
-from quadriga.shared.bus.introduction import Introduction
-from quadriga.shared.bus.lead_watch import Loss, loss_error
-from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.bus.discovery import await_agents, join, start_together
+from quadriga.shared.bus.liveness import Loss, loss_error
+from quadriga.shared.bus.process_info import ProcessInfo
+from quadriga.shared.bus.session import Bus
 from quadriga.shared.config.sections import BRIDGED, Config
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.members import plant_name
@@ -85,8 +85,8 @@ def run(
         with interruptible(stopped):
             server = PlantServer(config, plant, bus, time, name)
         server.words = words
-        me, realtime = Introduction(bus, config), config.world.mode == "realtime"
-        if not meet(bus, config, stopped, me):
+        me, realtime = ProcessInfo(bus, config), config.world.mode == "realtime"
+        if not join(bus, config, stopped, me):
             return
         pace = TeamPace(bus, config, me) if robot and realtime else None
         end_collection()

@@ -12,7 +12,7 @@ from quadriga.plant.late import FRESH, HOLD, Lateness, hold_joints
 from quadriga.plant.pace import TeamPace
 from quadriga.plant.server import PlantServer
 from quadriga.plant.team_time import plant_gone
-from quadriga.shared.bus.zenoh_bus import HERE
+from quadriga.shared.bus.session import HERE
 from quadriga.shared.runtime.clock import Rate
 from quadriga.shared.wire import codes
 from quadriga.shared.wire.messages import Command
@@ -65,8 +65,7 @@ def _look_at_others(server: PlantServer, pace: TeamPace | None) -> None:
     time.look(server.bus.members_at(HERE))
     timeout = server.config.bus.clock_timeout
     if behind := time.behind(tick - round(1000 * timeout)):
-        note = server.bus.standstill.note
-        time.end = plant_gone(sorted(behind), f"silent for {timeout:g} s{note}")
+        time.end = plant_gone(sorted(behind), f"silent for {timeout:g} s")
     if news := pace.news():
         server.announce(codes.CLOCK_OFF, server.plant.names[0], news)
     if (was_set := pace.look()) is not None:

@@ -13,9 +13,9 @@ from quadriga.plant.lost import LostCommands
 from quadriga.plant.protocol import Plant
 from quadriga.plant.team_time import TeamTime
 from quadriga.plant.words import NO_WORDS, Words
-from quadriga.shared.bus.barrier import members
-from quadriga.shared.bus.lead_watch import LossWatch, find_lost_link
-from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.bus.liveness import LossTimer, find_lost_link
+from quadriga.shared.bus.membership import members
+from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
 from quadriga.shared.errors import ConfigError
@@ -24,8 +24,15 @@ from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.wire import codes
 from quadriga.shared.wire.codec import encode, truncate_text
-from quadriga.shared.wire.event_line import format_event
-from quadriga.shared.wire.messages import Clock, Command, Event, Reset, SafeStop, Status
+from quadriga.shared.wire.messages import (
+    Clock,
+    Command,
+    Event,
+    Reset,
+    SafeStop,
+    Status,
+    format_event,
+)
 from quadriga.shared.wire.topics import CLOCK, EVENT, POSTURE, STATE, STATUS, TRUTH
 
 _TOLD_AFTER: Final = 5.0  # s; a process looks for a router that is gone at least every 4 s
@@ -72,7 +79,7 @@ class PlantServer:
         self._heard: SafeStop | None = None
         self._released: Reset | None = None
         self._outage: tuple[float, float] | None = None  # when the link was back, and after what
-        self._link = LossWatch(lambda: find_lost_link(bus, config), config, grace=0.0)
+        self._link = LossTimer(lambda: find_lost_link(bus, config), config, grace=0.0)
         self._put_state = {
             name: bus.publisher(STATE.key(team, name), droppable=realtime) for name in plant.names
         }
@@ -149,7 +156,7 @@ class PlantServer:
 
         Nobody hears it then. That a link is back is announced once the others have one, too.
         """
-        before, loss, now = self._link.since, self._link.look(), monotonic()
+        before, loss, now = self._link.since, self._link.poll(), monotonic()
         if loss is not None and self.time.end is None:
             self.time.end = End(*loss)
         if before is not None and self._link.since is None:
@@ -173,7 +180,7 @@ class PlantServer:
         """Why a robot is given up, and what was wrong with its latest command if something was."""
         if refused := self.commands.why_refused(robot):
             why += f", its last command was refused ({refused})"
-        return why + self.bus.standstill.note
+        return why
 
     def publish_status(self, status: Status) -> None:
         """Publish the plant's report on itself."""

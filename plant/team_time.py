@@ -18,8 +18,7 @@ from quadriga.shared.errors import MessageError
 from quadriga.shared.members import has_lead, plant_name
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.wire import codes
-from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.envelope import envelope
+from quadriga.shared.wire.codec import decode, envelope
 from quadriga.shared.wire.messages import Clock, Event
 from quadriga.shared.wire.topics import CLOCK, COMMAND, EVENT, STATE
 

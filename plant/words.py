@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from typing import Final, NamedTuple
 
-from quadriga.shared.bus.zenoh_bus import Arrival, Bus
+from quadriga.shared.bus.session import Arrival, Bus
 from quadriga.shared.errors import MessageError
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import EStop, LiveFault, Message, Reset, SafeStop

@@ -24,7 +24,6 @@ RESET: Final = "reset"  # releases an emergency stop, once
 RESUME: Final = "resume"  # has a team that stands go on, once
 DOCTOR: Final = "doctor"  # asks everybody how they are
 OBSERVER: Final = "observer"  # whoever looks on: `echo`, `hz`
-PROBE: Final = "probe"  # asks a router, as it starts, whether its rules are in force
 
 # Who drives time, by name: the only plant, or that of the first robot. The others leave with it.
 LEADS: Final = frozenset((SIM, "plant_r1"))

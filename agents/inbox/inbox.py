@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Sequence
 from typing import Any, Final
@@ -21,14 +20,12 @@ from quadriga.agents.step_io import Inputs
 from quadriga.agents.teammates import concerns_agents
 from quadriga.agents.time_grid import step_ms
 from quadriga.shared.config.sections import Config
-from quadriga.shared.config.timing import waits_for_router
 from quadriga.shared.errors import MessageError
 from quadriga.shared.members import OPERATOR, PLANNER, SIM
 from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.robot.conventions import Array, robot_names
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import EStop, Event, Message, Plan, Reference, State, Truth
-from quadriga.shared.wire.tick_gate import TickGate
 from quadriga.shared.wire.topics import (
     ESTOP,
     EVENT,
@@ -52,8 +49,6 @@ Due = tuple[Source, Order]  # a message of a source, and all before it
 UNREADABLE: Final = "unreadable"  # reason of a stop whose message does not decode
 _NEVER: Final = (-1, 0)
 _HELD: Final = 256  # messages of one source beyond those of the stand; more can only be a flood
-_GAP_MS: Final = 100  # from one state to the next; a longer jump must be confirmed by one more
-_JUMP_MS: Final = 5000  # longer than any silence that the team survives, its router aside
 
 
 class Inbox:
@@ -74,7 +69,6 @@ class Inbox:
         received: valid messages by topic and sender.
         refused: whether a valid message that is no state was refused: too many were held, or it
             is of a time too far ahead.
-        misfits: states since the newest one that were not newer, or too far ahead.
     """
 
     def __init__(self, config: Config, robot: str, peers: Sequence[str]) -> None:
@@ -103,14 +97,13 @@ class Inbox:
         self.received: Counter[Source] = Counter()
         self.refused = False
         self._end = AnnouncedEnd()
-        self.misfits = 0
         self._newest: dict[Source, Order] = {}
         self._held: dict[str, list[tuple[str, Any]]] = {}  # sender and message by topic
         self._count: Counter[Source] = Counter()  # of these
         # In lock-step nobody asks for what peers measure while they stand until they walk.
         self._most = _HELD + config.gait.stand_ms // SAMPLE_MS
         self._step_ms = step_ms(config)
-        self._gate = state_gate(config)
+        self._newest_state = -1  # its tick
         self._slew = ReferenceSlew(config)
         self._measurable = measured_limits(config.robot)
         is_measurable(self._measurable, self._measurable)  # compiled, or loaded, now
@@ -149,7 +142,7 @@ class Inbox:
         It would be held until then, and real messages would be late behind it.
         """
         tick = message.step * self._step_ms if isinstance(message, Plan) else message.tick
-        return tick > max(self._gate.newest, 0) + AHEAD_MS
+        return tick > max(self._newest_state, 0) + AHEAD_MS
 
     def _keep(self, topic: Topic, sender: str, message: Message) -> None:
         if isinstance(message, State):
@@ -162,7 +155,7 @@ class Inbox:
                 self._released = message
         elif isinstance(message, Event):
             if message.kind == "stop":
-                self._end.announce(message.tick, self._gate.newest)
+                self._end.announce(message.tick, self._newest_state)
             if concerns_agents(message) and len(self._events) < _HELD:
                 self._events.append(message)
         else:
@@ -176,22 +169,17 @@ class Inbox:
             self._newest[source] = max(self._newest.get(source, _NEVER), order_of(message))
 
     def _keep_newest(self, state: State) -> None:
-        late = state.tick <= self._gate.newest
-        if not self._gate.take(state.tick):
-            self.counters["states_passed_over" if late else f"ahead_{STATE.name}"] += 1
-            self.misfits += 1
+        if state.tick <= self._newest_state:
+            self.counters["states_passed_over"] += 1
             return
+        self._newest_state = state.tick
         passed = self._state
         if passed is not None and passed.tick % SAMPLE_MS == 0:
             passed, self._sample_end = self._sample_end, passed
         if passed is not None:
             self.counters["states_passed_over"] += 1
-        self._state, self.misfits = state, 0
+        self._state = state
         self._end.pass_tick(state.tick)
-
-    def trust_state(self, tick: int) -> None:
-        """Believe the state of `tick`, however far ahead: a replay knows that it was answered."""
-        self._gate.trust(tick)
 
     @property
     def ended(self) -> bool:
@@ -271,12 +259,6 @@ class Inbox:
         self._held[topic.name] = later
         self._count.subtract((topic.name, sender) for sender, _ in due)
         return sorted(due, key=lambda item: (item[0], order_of(item[1])))
-
-
-def state_gate(config: Config) -> TickGate:
-    """Which states are believed by their ticks."""
-    away_ms = 1000 * math.ceil(config.bus.reconnect_timeout) if waits_for_router(config) else 0
-    return TickGate(_GAP_MS, _JUMP_MS + away_ms)
 
 
 def decode_packet(topic: Topic, payload: bytes) -> Message | None:

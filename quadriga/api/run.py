@@ -18,7 +18,6 @@ from quadriga.recordings.traces import read_traces
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import RecordingError, did_you_mean
 from quadriga.shared.recording.config import recorded_config
-from quadriga.shared.recording.index import indexed_counts
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.wire.messages import Event
@@ -105,7 +104,7 @@ class Run:
         """
         counts: Mapping[str, int] | None = None
         if self.complete:
-            counts = indexed_counts(self.path)
+            counts = self._recording.indexed_counts()
         if counts is None:
             counts = Counter(entry.key for entry in self._recording.entries())
         own = f"{self.config.team.name}/"

@@ -12,7 +12,7 @@ from quadriga.progress import quiet_console
 from quadriga.shared.config.load import build
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.recording.writer import RECORDING
+from quadriga.shared.recording.metadata import RECORDING
 from quadriga.shared.runtime.blas import blas_threads_kept
 from quadriga.team.endpoint import with_free_endpoint
 from quadriga.team.run_folder import make_run_dir

@@ -20,7 +20,7 @@ from cryptography.hazmat.primitives.serialization import (
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.security.certificate import UNREADABLE, describe_pem_error, load_certificate
+from quadriga.shared.security.certificates import UNREADABLE, describe_pem_error, load_certificate
 
 _YEARS: Final = timedelta(days=3650)  # of the authority itself
 # RFC 1123, and `_` as container networks have it; digits alone are an address with a mistake.

@@ -1,38 +1,36 @@
-"""The folder of a team's certificates: made, renewed, revoked, shown."""
+"""The folder of a team's certificates: made, renewed, shown."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from datetime import datetime
-from fcntl import LOCK_EX, flock
 from pathlib import Path
 from typing import Final
 
 from quadriga.certs.authority import Authority, Pair, Subject
+from quadriga.shared.config.endpoints import host_and_port
+from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError, did_you_mean, name_file_errors
 from quadriga.shared.members import ROUTER
-from quadriga.shared.runtime.atomic import atomic_write, write_bytes, write_text
-from quadriga.shared.security.certificate import Certificate, is_signed, read_certificate
-from quadriga.shared.security.roll import (
-    MOST_VALID,
-    REVOKED,
-    common_name,
-    format_numbers,
-    read_numbers,
-    split_common_name,
+from quadriga.shared.runtime.atomic import atomic_write, write_bytes
+from quadriga.shared.security.access import team_identities
+from quadriga.shared.security.certificates import (
+    AUTHORITY,
+    EXPIRED,
+    Certificate,
+    TlsFiles,
+    is_signed,
+    read_certificate,
 )
-from quadriga.shared.security.tls import AUTHORITY, TlsFiles, identity_folder
 
 _AUTHORITY_KEY: Final = "authority.key"
-_ISSUED: Final = "issued.json"  # by identity how many certificates it was given
-_LOCK: Final = ".lock"  # held by who changes the folder
 _PRIVATE: Final = 0o600
 _OWN: Final = 0o700
 # Beside the hosts that are given: a router's own machine always reaches it.
 _HERE: Final = ("localhost", "127.0.0.1", "::1")
+_ONE_WALK: Final = 1.0  # days that certificates for one walk are valid
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,23 +40,18 @@ class Standing:
     Attributes:
         identity: who.
         certificate: the one in the folder.
-        revoked: whether the router refuses it, once it has heard of it.
         signed: whether the authority beside it has signed it.
     """
 
     identity: str
     certificate: Certificate
-    revoked: bool
     signed: bool
 
     def state(self, now: datetime) -> str:
         """In words whether its process can use it."""
-        owner = split_common_name(self.certificate.name)[0]
-        if owner != self.identity:
-            return f"somebody else's ({owner})"
-        if not self.signed:
-            return "another authority's"
-        return "revoked" if self.revoked else self.certificate.state(now)
+        if self.certificate.name != self.identity:
+            return f"somebody else's ({self.certificate.name})"
+        return self.certificate.state(now) if self.signed else "another authority's"
 
 
 class CertificateFolder:
@@ -72,69 +65,52 @@ class CertificateFolder:
     def __init__(self, path: Path, identities: Sequence[str]) -> None:
         self.path, self._identities = path, tuple(identities)
 
+    @classmethod
+    def of_team(cls, config: Config) -> CertificateFolder:
+        """The folder of a team, for all that its configuration gives a certificate."""
+        names = [who.name for who in team_identities(config)]
+        return cls(Path(config.bus.certificates), names)
+
     def make(self, team: str, hosts: Sequence[str], now: datetime, days: float) -> list[str]:
-        """Give everybody a certificate who has none, and the team an authority; who was given one.
+        """Give the team an authority, and everybody a certificate who has none that is valid.
+
+        Returns:
+            Who was given one.
 
         Raises:
             ConfigError: something in the folder cannot be read.
             OSError: it cannot be written.
         """
         self.path.mkdir(mode=_OWN, parents=True, exist_ok=True)
-        with self._alone():
-            if (self.path / _AUTHORITY_KEY).exists():
-                authority = self._authority()
-            else:
-                authority = Authority.create(team, now)
-                _write_private(self.path / _AUTHORITY_KEY, authority.pair.key)
-                write_bytes(self.path / AUTHORITY, authority.pair.certificate)
-            without = [n for n in self._identities if not self._files(n).certificate.exists()]
-            for name in without:
-                self._issue(authority, name, hosts if name == ROUTER else (), now, days)
-            self._write_numbers(self.revoked_file, self._numbers(self.revoked_file))
+        if (self.path / _AUTHORITY_KEY).exists():
+            authority = self._authority()
+        else:
+            authority = Authority.create(team, now)
+            _write_private(self.path / _AUTHORITY_KEY, authority.pair.key)
+            write_bytes(self.path / AUTHORITY, authority.pair.certificate)
+        valid = {s.identity for s in self.standings() if s.certificate.state(now) != EXPIRED}
+        without = [name for name in self._identities if name not in valid]
+        for name in without:
+            self._issue(authority, name, hosts, now, days)
         return without
 
     def renew(
         self, names: Iterable[str], hosts: Sequence[str], now: datetime, days: float
     ) -> list[str]:
-        """Give these identities, or all for none, a new certificate; what stands in them.
+        """Give these identities, or all for none, a new certificate; who they were.
 
-        The old ones stay valid until they expire or are revoked. A router keeps its addresses
-        unless others are given.
+        The old ones stay valid until they expire. A router keeps its addresses unless others are
+        given.
 
         Raises:
-            ConfigError: there is no such identity, or it has too many that are valid.
+            ConfigError: there is no such identity, or no authority.
             OSError: the folder cannot be written.
         """
-        chosen, made = self._check(names) or self._identities, []
+        chosen = self._check(names) or list(self._identities)
         authority = self._authority()
-        with self._alone():
-            for name in chosen:
-                listens = hosts or self._hosts(name) if name == ROUTER else ()
-                made.append(self._issue(authority, name, listens, now, days))
-        return made
-
-    def revoke(self, names: Iterable[str]) -> list[str]:
-        """Have the router refuse all certificates that these identities were given so far.
-
-        Returns:
-            The common names that are not valid any more.
-
-        Raises:
-            ConfigError: there is no such identity, or it is the router's, which nobody asks.
-            OSError: the folder cannot be written.
-        """
-        gone, chosen = [], self._check(names)
-        if ROUTER in chosen:
-            cause = "`quadriga certs make` in an empty folder replaces everything"
-            raise ConfigError("revoke", repr(ROUTER), "who connects to the router", cause)
-        with self._alone():
-            issued, revoked = self._numbers(self._issued_file), self._numbers(self.revoked_file)
-            for name in chosen:
-                before, last = revoked.get(name, 0), issued.get(name, 0)
-                gone += [common_name(name, k) for k in range(before + 1, last + 1)]
-                revoked[name] = last
-            self._write_numbers(self.revoked_file, revoked)
-        return gone
+        for name in chosen:
+            self._issue(authority, name, hosts, now, days)
+        return chosen
 
     def standings(self) -> list[Standing]:
         """How each identity that has a certificate stands.
@@ -142,37 +118,13 @@ class CertificateFolder:
         Raises:
             ConfigError: something in the folder cannot be read.
         """
-        revoked = self._numbers(self.revoked_file)
         found = []
         for name in self._identities:
-            path = self._files(name).certificate
-            if path.exists():
-                held = read_certificate(path)
-                number = split_common_name(held.name)[1]
-                signed = is_signed(path, self._files(name).authority)
-                found.append(Standing(name, held, number <= revoked.get(name, 0), signed))
+            files = TlsFiles.within(self.path / name)
+            if files.certificate.exists():
+                signed = is_signed(files.certificate, files.authority)
+                found.append(Standing(name, read_certificate(files.certificate), signed))
         return found
-
-    @contextmanager
-    def _alone(self) -> Iterator[None]:
-        """Within the block no other process changes the folder: no number is given twice."""
-        with name_file_errors(ConfigError, self.path, "the certificates of a team"):
-            lock = (self.path / _LOCK).open("a", encoding="utf-8")
-        with lock:
-            flock(lock, LOCK_EX)
-            yield
-
-    @property
-    def _issued_file(self) -> Path:
-        return self.path / _ISSUED
-
-    @property
-    def revoked_file(self) -> Path:
-        """What the router must know of who is revoked."""
-        return identity_folder(self.path, ROUTER) / REVOKED
-
-    def _files(self, identity: str) -> TlsFiles:
-        return TlsFiles.within(identity_folder(self.path, identity))
 
     def _authority(self) -> Authority:
         cause = "`quadriga certs` is run where the authority's key is kept"
@@ -181,33 +133,20 @@ class CertificateFolder:
             key = (self.path / _AUTHORITY_KEY).read_bytes()
         return Authority(Pair(certificate, key))
 
-    def _hosts(self, name: str) -> Sequence[str]:
-        return read_certificate(self._files(name).certificate).hosts
-
     def _issue(
         self, authority: Authority, name: str, hosts: Sequence[str], now: datetime, days: float
-    ) -> str:
-        """Write the next certificate of an identity; its common name."""
-        issued = self._numbers(self._issued_file)
-        number = issued.get(name, 0) + 1
-        if number > self._numbers(self.revoked_file).get(name, 0) + MOST_VALID:
-            raise ConfigError(
-                f"certificates of {name}",
-                f"{MOST_VALID} that are valid",
-                f"at most {MOST_VALID}",
-                f"`quadriga certs revoke {name}` first",
-            )
-        listens = tuple(dict.fromkeys((*hosts, *_HERE))) if name == ROUTER else ()
-        subject = Subject(common_name(name, number), listens)
-        pair = authority.issue(subject, now, days)
-        # Counted before it is written: a number is never given twice.
-        self._write_numbers(self._issued_file, {**issued, name: number})
-        files = self._files(name)
+    ) -> None:
+        """Write a certificate of an identity; a router's has the addresses at which it listens."""
+        files, listens = TlsFiles.within(self.path / name), tuple[str, ...]()
+        if name == ROUTER:
+            if not hosts and files.certificate.exists():
+                hosts = read_certificate(files.certificate).hosts
+            listens = tuple(dict.fromkeys((*hosts, *_HERE)))
+        pair = authority.issue(Subject(name, listens), now, days)
         files.key.parent.mkdir(mode=_OWN, parents=True, exist_ok=True)
         _write_private(files.key, pair.key)
         write_bytes(files.authority, authority.pair.certificate)
         write_bytes(files.certificate, pair.certificate)
-        return subject.name
 
     def _check(self, names: Iterable[str]) -> list[str]:
         given = list(names)
@@ -218,15 +157,21 @@ class CertificateFolder:
                 raise ConfigError("certificate of", repr(name), f"one of {known}", hint)
         return given
 
-    def _numbers(self, path: Path) -> dict[str, int]:
-        if not path.exists():
-            return {}
-        with name_file_errors(ConfigError, path, "numbers of certificates"):
-            return read_numbers(path.read_text(encoding="utf-8"), str(path))
 
-    def _write_numbers(self, path: Path, numbers: dict[str, int]) -> None:
-        path.parent.mkdir(mode=_OWN, parents=True, exist_ok=True)
-        write_text(path, format_numbers(numbers))
+def secure(config: Config, folder: Path, now: datetime) -> Config:
+    """The same team behind a router with certificates, which are made for one walk.
+
+    Args:
+        config: of a team at an address of this computer.
+        folder: gets the certificates.
+        now: by the clock of this computer.
+    """
+    endpoint = f"tls/{config.bus.endpoint.partition('/')[2]}"
+    bus = replace(config.bus, mode="client", endpoint=endpoint, certificates=str(folder))
+    secured = replace(config, bus=bus)
+    hosts = [host_and_port(endpoint)[0]]
+    CertificateFolder.of_team(secured).make(config.team.name, hosts, now, _ONE_WALK)
+    return secured
 
 
 def _write_private(path: Path, content: bytes) -> None:

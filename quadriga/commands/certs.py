@@ -14,16 +14,14 @@ if TYPE_CHECKING:
 
     from quadriga.certs.folder import CertificateFolder
 
-_DAYS: Final = 365.0
+_DAYS: Final = 30.0  # nobody can take a certificate back
 _LONGEST: Final = 3650.0  # days, as long as the authority itself is valid
 
 
 def add(add_command: AddCommand) -> None:
-    command = add_command("certs", run, "make, renew, revoke and show a team's certificates")
-    command.add_argument("action", choices=("make", "renew", "revoke", "show"))
-    command.add_argument(
-        "names", nargs="*", metavar="NAME", help="renew: whose (all); revoke: whose"
-    )
+    command = add_command("certs", run, "make, renew and show a team's certificates")
+    command.add_argument("action", choices=("make", "renew", "show"))
+    command.add_argument("names", nargs="*", metavar="NAME", help="renew: whose (all)")
     command.add_argument(
         "--router",
         dest="hosts",
@@ -42,30 +40,22 @@ def add(add_command: AddCommand) -> None:
 
 
 def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
-    """Do one of the four in the folder `bus.certificates`."""
-    from quadriga.certs.secured import certificates_of
+    """Do one of the three in the folder `bus.certificates`."""
+    from quadriga.certs.folder import CertificateFolder
     from quadriga.shared.runtime.clock import utc_now
 
     action, names = arguments.action, arguments.names
     if not 0.0 < arguments.days <= _LONGEST:
         raise ConfigError("--days", f"{arguments.days:g}", f"above 0 and at most {_LONGEST:g}")
-    if names and action in ("make", "show"):
+    if names and action != "renew":
         raise ConfigError("NAME", " ".join(names), f"none with {action!r}")
-    if not names and action == "revoke":
-        raise ConfigError("NAME", "none", "whose certificates are to be revoked")
-    folder, now = certificates_of(config), utc_now()
+    folder, now = CertificateFolder.of_team(config), utc_now()
     if action == "make":
         made = folder.make(config.team.name, arguments.hosts, now, arguments.days)
         say(f"{', '.join(made) or 'nobody'} got a certificate in {folder.path}")
     elif action == "renew":
         made = folder.renew(names, arguments.hosts, now, arguments.days)
         say(f"new: {', '.join(made)}; copy their folders to their machines")
-    elif action == "revoke":
-        gone = folder.revoke(names)
-        say(
-            f"revoked: {', '.join(gone) or 'nothing that was valid'}; copy {folder.revoked_file} "
-            "to the router and start it again: until then it knows nothing of it"
-        )
     _show(folder, now)
     return 0
 
@@ -74,13 +64,12 @@ def _show(folder: CertificateFolder, now: datetime) -> None:
     """Print who has which certificate, and for how long."""
     from quadriga.tables import align_columns
 
-    rows = [("identity", "certificate", "days left", "state")]
+    rows = [("identity", "days left", "state")]
     standings = folder.standings()
     if not standings:
         cause = "`quadriga certs make` makes it"
         raise ConfigError(str(folder.path), "no certificate", "the certificates of a team", cause)
     for standing in standings:
-        held = standing.certificate
-        days = f"{held.days_left(now):.0f}"
-        rows.append((standing.identity, held.name, days, standing.state(now)))
-    print("\n".join(align_columns(rows, right=(2,), indent="")))
+        days = f"{standing.certificate.days_left(now):.0f}"
+        rows.append((standing.identity, days, standing.state(now)))
+    print("\n".join(align_columns(rows, right=(1,), indent="")))

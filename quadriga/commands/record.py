@@ -14,7 +14,7 @@ from quadriga.commands.options import KEY_HELP, add_no_render, add_wait
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.printable import printable, printable_line
-from quadriga.shared.recording.admission import describe_refused
+from quadriga.shared.recording.quota import describe_refused
 from quadriga.shared.runtime.signals import stop_flag
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def run(arguments: argparse.Namespace, config: Config, given: Given) -> int:
     from rich.console import Console
 
     from quadriga.recorder import process
-    from quadriga.shared.recording.writer import RECORDING
+    from quadriga.shared.recording.metadata import RECORDING
 
     path, selection = arguments.output, _selection(arguments)
     if path is None:

@@ -7,20 +7,18 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Final
 
-from quadriga.shared.bus.diagnosis import BAD, GOOD, NOTE, Diagnosis
-from quadriga.shared.security.certificate import EXPIRED, NOT_YET_VALID, Certificate
-from quadriga.shared.security.roll import split_common_name
+from quadriga.shared.bus.diagnostics import BAD, GOOD, NOTE, Diagnosis
+from quadriga.shared.security.certificates import EXPIRED, NOT_YET_VALID, Certificate
 
 CERTIFICATE: Final = "certificate"
 CERTIFICATE_EARLY: Final = "certificate-not-yet-valid"
 CERTIFICATE_EXPIRED: Final = "certificate-expired"
 CERTIFICATE_EXPIRING: Final = "certificate-expiring"
 CERTIFICATE_UNTRUSTED: Final = "certificate-untrusted"
-CERTIFICATE_REVOKED: Final = "certificate-revoked"
 CERTIFICATE_UNREADABLE: Final = "certificate-unreadable"
 KEY_OPEN: Final = "key-open"
 
-_SOON: Final = 14.0  # days: time to renew
+_SOON: Final = 7.0  # days: time to renew
 _OTHERS: Final = 0o077  # permissions of others than the owner
 
 
@@ -43,18 +41,14 @@ class HeldCertificate:
     problem: str = ""
 
 
-def check_certificates(
-    held: Sequence[HeldCertificate], revoked: dict[str, int], now: datetime
-) -> tuple[Diagnosis, ...]:
+def check_certificates(held: Sequence[HeldCertificate], now: datetime) -> tuple[Diagnosis, ...]:
     """All that is wrong with them, or one line that they are good.
 
     Args:
         held: by this computer.
-        revoked: by identity the number of the last certificate that is not valid any more, if this
-            computer has that list.
         now: by its clock.
     """
-    found = tuple(item for each in held for item in _check(each, revoked, now))
+    found = tuple(item for each in held for item in _check(each, now))
     days = [each.certificate.days_left(now) for each in held if each.certificate]
     if found or not days:
         return found
@@ -63,7 +57,7 @@ def check_certificates(
     return (Diagnosis(CERTIFICATE, GOOD, text),)
 
 
-def _check(held: HeldCertificate, revoked: dict[str, int], now: datetime) -> Iterator[Diagnosis]:
+def _check(held: HeldCertificate, now: datetime) -> Iterator[Diagnosis]:
     name, certificate = held.identity, held.certificate
     again = f"`quadriga certs renew {name}`, and copy its folder to its machine"
     if held.key_mode is None:
@@ -75,24 +69,21 @@ def _check(held: HeldCertificate, revoked: dict[str, int], now: datetime) -> Ite
     if certificate is None:
         yield Diagnosis(CERTIFICATE_UNREADABLE, BAD, f"that of {name}: {held.problem}", again)
         return
-    identity, number = split_common_name(certificate.name)
     days = certificate.days_left(now)
-    if identity != name:
-        text = f"the folder {name} has the certificate {certificate.name}"
+    if certificate.name != name:
+        text = f"the folder {name} has the certificate of {certificate.name}"
         yield Diagnosis(CERTIFICATE_UNTRUSTED, BAD, text, f"copy the folder {name} again")
     if not held.signed:
-        text = f"{certificate.name} is not signed by the authority whose certificate is beside it"
+        text = f"that of {name} is not signed by the authority whose certificate is beside it"
         cause = "files of two teams, or of before `quadriga certs make` began anew: copy the folder"
         yield Diagnosis(CERTIFICATE_UNTRUSTED, BAD, text, cause)
-    if 0 < number <= revoked.get(identity, 0):
-        yield Diagnosis(CERTIFICATE_REVOKED, BAD, f"{certificate.name} is revoked", again)
     state = certificate.state(now)
     if state == NOT_YET_VALID:
-        text = f"{certificate.name} is not valid before {certificate.begins:%F %T} UTC"
+        text = f"that of {name} is not valid before {certificate.begins:%F %T} UTC"
         yield Diagnosis(CERTIFICATE_EARLY, BAD, text, "is the clock of this computer right?")
     elif state == EXPIRED:
-        text = f"{certificate.name} expired {-days:.1f} days ago"
+        text = f"that of {name} expired {-days:.1f} days ago"
         yield Diagnosis(CERTIFICATE_EXPIRED, BAD, text, again)
     elif days < _SOON:
-        text = f"{certificate.name} expires in {days:.1f} days"
+        text = f"that of {name} expires in {days:.1f} days"
         yield Diagnosis(CERTIFICATE_EXPIRING, NOTE, text, again)

@@ -9,23 +9,29 @@ from quadriga.doctor.machine import check_machine, need_of
 from quadriga.doctor.readings import read_machine
 from quadriga.doctor.report import DoctorReport, MemberReport
 from quadriga.doctor.trust import look_at_certificates, try_certificate
-from quadriga.shared.bus.absence import DIFFERS, TeamView, diagnose, diagnose_nameless
-from quadriga.shared.bus.agreement import REFUSED as DECISIVE
-from quadriga.shared.bus.agreement import disagreements
-from quadriga.shared.bus.diagnosis import BAD, GOOD, NOTE, UNKNOWN, Diagnosis
-from quadriga.shared.bus.distrust import REVOKED
-from quadriga.shared.bus.inquiry import ask_clock, look, pause
-from quadriga.shared.bus.introduction import describe_process
-from quadriga.shared.bus.reach import OPEN, REFUSED, UNTRIED, Reach, is_loopback, try_endpoint
-from quadriga.shared.bus.roster import members, processes
-from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.bus.diagnostics import (
+    BAD,
+    DECISIVE,
+    DIFFERS,
+    GOOD,
+    NOTE,
+    UNKNOWN,
+    Diagnosis,
+    TeamView,
+    diagnose,
+    disagreements,
+)
+from quadriga.shared.bus.discovery import ask, ask_clock, view_of
+from quadriga.shared.bus.endpoint import OPEN, REFUSED, UNTRIED, Reach, is_loopback, try_endpoint
+from quadriga.shared.bus.membership import members, processes
+from quadriga.shared.bus.process_info import describe_process
+from quadriga.shared.bus.session import HERE, Bus, pause
 from quadriga.shared.config.endpoints import is_tls
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError, ConfigError
 from quadriga.shared.members import DOCTOR, SIM, Member
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.runtime.installed import project_version
-from quadriga.shared.security.tls import tls_files
 from quadriga.shared.wire.about import About
 
 LINK: Final = "link"
@@ -53,14 +59,13 @@ def examine(config: Config, *, here: bool) -> DoctorReport:
     view, link = _look_at_team(config, me)
     differs = tuple(_own_differences(me, view))
     found = tuple(_report(member, view, config) for member in processes(config))
-    router = diagnose_nameless(view)
-    return DoctorReport(team, endpoint, me.version, link, (*differs, *machine), found, router)
+    return DoctorReport(team, endpoint, me.version, link, (*differs, *machine), found)
 
 
 def _report(member: Member, view: TeamView, config: Config) -> MemberReport:
     """What is to be said of a member; of one that is not there also whether it could come in."""
     answers, found = view.answers.get(member.name, ()), diagnose(member, view)
-    if not answers and not any(item.code == REVOKED for item in found):
+    if not answers:
         found += tuple(try_certificate(config, member.name))
     return MemberReport(member.name, answers, found)
 
@@ -89,7 +94,7 @@ def _look_at_team(config: Config, me: About) -> tuple[TeamView, Diagnosis]:
             if monotonic() > deadline:
                 break
             pause()
-        view = _compare_clocks(bus, config, look(bus, config, me))
+        view = _compare_clocks(bus, config, view_of(bus, config, ask(bus), me))
     if view.linked:
         return view, Diagnosis(LINK, GOOD, f"linked by {config.bus.endpoint}")
     return view, _judge_reach(try_endpoint(config.bus.endpoint), waiting=False)
@@ -109,6 +114,8 @@ def _lack_of_certificate(config: Config) -> Diagnosis | None:
     """Why the doctor cannot be let in, if it has no certificate here."""
     if not is_tls(config.bus.endpoint):
         return None
+    from quadriga.shared.security.certificates import tls_files
+
     try:
         tls_files(config.bus.certificates, DOCTOR)
     except ConfigError as error:

@@ -7,12 +7,11 @@ its certificate, with what it sees and has.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from quadriga.shared.bus.absence import CLOCK_OFF, NOT_REALTIME, TeamView, diagnose
-from quadriga.shared.bus.diagnosis import BAD
+from quadriga.shared.bus.diagnostics import BAD, CLOCK_OFF, NOT_REALTIME, TeamView, diagnose
 from quadriga.shared.members import DOCTOR, ROUTER, Member
 from quadriga.shared.wire.about import READY
 
@@ -40,22 +39,19 @@ class Health:
         return f"{UNWELL}: {self.reason}" if self.reason else WELL
 
 
-def judge_team(
-    team: Sequence[Member], view: TeamView, denied: Mapping[str, str]
-) -> tuple[Health, ...]:
+def judge_team(team: Sequence[Member], view: TeamView) -> tuple[Health, ...]:
     """The health of all processes, of the router and of the doctor itself.
 
     Args:
         team: the processes.
         view: what the doctor sees of them.
-        denied: by identity what the router has lately denied it.
     """
     link = "" if view.linked else "the doctor has no link to it"
-    found = (Health(member.name, _find_reason(member, view, denied)) for member in team)
+    found = (Health(member.name, _find_reason(member, view)) for member in team)
     return (*found, Health(ROUTER, link), Health(DOCTOR))
 
 
-def _find_reason(member: Member, view: TeamView, denied: Mapping[str, str]) -> str:
+def _find_reason(member: Member, view: TeamView) -> str:
     """Why a process is not healthy; "" if it is."""
     found = diagnose(member, view)
     wrong = [item.text for item in found if item.verdict == BAD and item.code not in _ELSE]
@@ -65,6 +61,4 @@ def _find_reason(member: Member, view: TeamView, denied: Mapping[str, str]) -> s
     if about.stage != READY:
         return ", ".join(item.text for item in found if item.code == about.stage)
     unheard = sorted(view.names - {member.name, *about.sees})
-    if unheard:
-        return f"does not hear {', '.join(unheard)}"
-    return denied.get(member.name, "")
+    return f"does not hear {', '.join(unheard)}" if unheard else ""

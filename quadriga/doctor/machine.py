@@ -7,10 +7,17 @@ from dataclasses import dataclass
 from typing import Final
 
 from quadriga.doctor.packages import check_packages
-from quadriga.shared.bus.absence import CLOCK_LIMIT, CLOCK_REMEDY
-from quadriga.shared.bus.diagnosis import BAD, GOOD, NOTE, UNKNOWN, Diagnosis
-from quadriga.shared.bus.roster import processes
-from quadriga.shared.bus.zenoh_settings import RECEIVE_BUFFER
+from quadriga.shared.bus.diagnostics import (
+    BAD,
+    CLOCK_LIMIT,
+    CLOCK_REMEDY,
+    GOOD,
+    NOTE,
+    UNKNOWN,
+    Diagnosis,
+)
+from quadriga.shared.bus.membership import processes
+from quadriga.shared.bus.settings import RECEIVE_BUFFER
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import OPERATOR, RECORDER
 

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from quadriga.shared.bus.diagnosis import BAD, GOOD, UNKNOWN, Diagnosis
+from quadriga.shared.bus.diagnostics import BAD, GOOD, UNKNOWN, Diagnosis
 
 PACKAGES: Final = "packages"
 _REQUIREMENT: Final = re.compile(r"([A-Za-z0-9._-]+)\s*(?:\[[^\]]*\])?\s*\(?([^)]*)\)?")

@@ -7,8 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Final
 
-from quadriga.shared.bus.absence import MemberAnswer
-from quadriga.shared.bus.diagnosis import BAD, Diagnosis
+from quadriga.shared.bus.diagnostics import BAD, Diagnosis, MemberAnswer
 from quadriga.tables import align_columns
 
 FORMAT: Final = 1  # of the JSON; a field that is added does not change it
@@ -34,7 +33,6 @@ class DoctorReport:
         link: how this computer reaches that endpoint.
         here: of this computer, and of what the command was given.
         members: of each process; None: nobody was asked.
-        router: what it has refused to somebody who has no name.
     """
 
     team: str
@@ -43,19 +41,18 @@ class DoctorReport:
     link: Diagnosis
     here: tuple[Diagnosis, ...]
     members: tuple[MemberReport, ...] | None = None
-    router: tuple[Diagnosis, ...] = ()
 
     @property
     def is_well(self) -> bool:
         """Whether nothing is wrong; what is unknown is not."""
         said = [d for member in self.members or () for d in member.diagnoses]
-        return not any(d.verdict == BAD for d in (self.link, *self.router, *self.here, *said))
+        return not any(d.verdict == BAD for d in (self.link, *self.here, *said))
 
 
 def format_report(report: DoctorReport) -> list[str]:
     """A line for each finding: whose it is, how bad, what it is, and what to do."""
     lines = [f"team {report.team!r} at {report.endpoint}"]
-    rows = [*_rows("link", (report.link,)), *_rows("router", report.router)]
+    rows = [*_rows("link", (report.link,))]
     for member in report.members or ():
         rows += _rows(member.name, member.diagnoses)
     here = [row for item in report.here for row in _rows(item.code, (item,))]
@@ -75,7 +72,6 @@ def to_json(report: DoctorReport) -> str:
         "here": [asdict(item) for item in report.here],
     }
     if report.members is not None:
-        body["router"] = [asdict(item) for item in report.router]
         body["members"] = [_member(member) for member in report.members]
     return json.dumps(body, indent=2, ensure_ascii=False)
 

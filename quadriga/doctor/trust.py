@@ -8,19 +8,25 @@ from pathlib import Path
 from typing import Final
 
 from quadriga.doctor.certificates import HeldCertificate, check_certificates
-from quadriga.shared.bus.diagnosis import BAD, GOOD, Diagnosis
-from quadriga.shared.bus.distrust import EXPIRED, NOT_TRUSTED
+from quadriga.shared.bus.diagnostics import BAD, GOOD, Diagnosis
 from quadriga.shared.config.endpoints import is_tls
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError, system_reason
-from quadriga.shared.members import ROUTER
 from quadriga.shared.runtime.clock import utc_now
 from quadriga.shared.security import handshake
-from quadriga.shared.security.certificate import is_signed, read_certificate
-from quadriga.shared.security.roll import REVOKED, read_numbers, team_roll
-from quadriga.shared.security.tls import TlsFiles, identity_folder, tls_files
+from quadriga.shared.security.access import team_identities
+from quadriga.shared.security.certificates import EXPIRED as HAS_EXPIRED
+from quadriga.shared.security.certificates import (
+    NOT_YET_VALID,
+    TlsFiles,
+    is_signed,
+    read_certificate,
+    tls_files,
+)
 
 TRUSTED: Final = "trusted"
+EXPIRED: Final = "expired"  # its certificate here, or the router's
+NOT_TRUSTED: Final = "not-trusted"
 
 
 def look_at_certificates(config: Config) -> tuple[Diagnosis, ...]:
@@ -29,20 +35,16 @@ def look_at_certificates(config: Config) -> tuple[Diagnosis, ...]:
         return ()
     folder = Path(config.bus.certificates)
     held = [
-        _read(who.name, TlsFiles.within(identity_folder(folder, who.name)))
-        for who in team_roll(config)
-        if identity_folder(folder, who.name).is_dir()
+        _read(who.name, TlsFiles.within(folder / who.name))
+        for who in team_identities(config)
+        if (folder / who.name).is_dir()
     ]
-    revoked: dict[str, int] = {}
-    with suppress(OSError, UnicodeDecodeError, ConfigError):  # the router's folder is elsewhere
-        path = identity_folder(folder, ROUTER) / REVOKED
-        revoked = read_numbers(path.read_text(encoding="utf-8"), str(path))
-    return check_certificates(held, revoked, utc_now())
+    return check_certificates(held, utc_now())
 
 
 def try_certificate(config: Config, name: str) -> Iterator[Diagnosis]:
     """Whether the router and the certificate of process `name` agree, if it is here."""
-    folder = identity_folder(Path(config.bus.certificates), name)
+    folder = Path(config.bus.certificates) / name
     if not (is_tls(config.bus.endpoint) and folder.is_dir()):
         return
     try:
@@ -62,9 +64,9 @@ def _judge(found: handshake.Handshake) -> tuple[str, str] | None:
     """Code and words for what came of a handshake; None: the way there is another matter."""
     if found.outcome == handshake.TRUSTED:
         return TRUSTED, "its certificate here and the router trust each other"
-    if found.outcome == handshake.EXPIRED:
+    if found.outcome == HAS_EXPIRED:
         return EXPIRED, f"it does not trust the router: {found.detail}"
-    if found.outcome == handshake.NOT_YET_VALID:
+    if found.outcome == NOT_YET_VALID:
         return NOT_TRUSTED, f"a certificate is not yet valid: {found.detail}"
     if found.outcome == handshake.UNTRUSTED:
         return NOT_TRUSTED, f"it does not trust the router: {found.detail}"

@@ -3,30 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
 from quadriga.doctor.health import Health, judge_team
-from quadriga.shared.bus.inquiry import ask, view_of
-from quadriga.shared.bus.introduction import describe_process
-from quadriga.shared.bus.roster import processes
-from quadriga.shared.bus.zenoh_bus import POLL, READY, Bus
+from quadriga.shared.bus.discovery import ask, view_of
+from quadriga.shared.bus.membership import processes
+from quadriga.shared.bus.process_info import describe_process
+from quadriga.shared.bus.session import POLL, READY, Bus
 from quadriga.shared.config.sections import Config
-from quadriga.shared.errors import ConfigError, MessageError, name_file_errors
+from quadriga.shared.errors import ConfigError, name_file_errors
 from quadriga.shared.members import DOCTOR, has_lead
-from quadriga.shared.printable import printable_line
 from quadriga.shared.runtime.atomic import write_text
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.runtime.signals import stop_on_signals
-from quadriga.shared.security.refusals import DENIED
-from quadriga.shared.security.roll import split_common_name
-from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.messages import Refusal
-from quadriga.shared.wire.topics import REFUSED
 
 EVERY: Final = 5.0  # s between two looks, each of which costs every process an answer
-_REMEMBERED: Final = 30.0  # s, for which it counts that something was denied
 _OVER: Final = 1.0  # s without who drives time after which the walk is over
 _LOST: Final = 15.0  # s without a link after which nobody is waited for: a router may come back
 
@@ -57,11 +49,11 @@ def watch_team(config: Config, folder: Path, stopped: Callable[[], bool] | None 
 
 def _watch(bus: Bus, config: Config, files: HealthFiles, stopped: Callable[[], bool]) -> None:
     me, team = describe_process(config, DOCTOR), processes(config)
-    refusals, end = RecentRefusals(bus), WalkEnd(bus)
+    end = WalkEnd(bus)
     while not (stopped() or end.is_over()):
         due = monotonic() + EVERY
         view = view_of(bus, config, ask(bus), me)
-        files.write(judge_team(team, view, refusals.recent()))
+        files.write(judge_team(team, view))
         while monotonic() < due and not (stopped() or end.is_over()):
             sleep(POLL)
 
@@ -90,31 +82,6 @@ class HealthFiles:
         """Remove all of them."""
         for path in self._written:
             path.unlink(missing_ok=True)
-
-
-class RecentRefusals:
-    """What the router tells that it has denied, and to whom.
-
-    What was too large or came too often is no matter of trust.
-    """
-
-    def __init__(self, bus: Bus) -> None:
-        """Listen from now on."""
-        self._take = bus.collect(REFUSED.key(bus.team))
-        self._last: dict[str, tuple[float, str]] = {}
-
-    def recent(self) -> dict[str, str]:
-        """By identity what was denied last, if that is not long ago."""
-        now = monotonic()
-        for _, _, payload in self._take():
-            with suppress(MessageError):
-                refusal = decode(payload, Refusal)
-                if refusal.reason == DENIED:
-                    what = printable_line(f"{refusal.action} {refusal.key}")
-                    identity, _ = split_common_name(refusal.who)
-                    self._last[identity] = now, f"the router denies it: {what}"
-        self._last = {who: told for who, told in self._last.items() if now - told[0] < _REMEMBERED}
-        return {who: text for who, (_, text) in self._last.items()}
 
 
 class WalkEnd:

@@ -15,7 +15,7 @@ from quadriga.drive import driver_words as words
 from quadriga.drive.charge import InCharge
 from quadriga.drive.driver_words import DriverWord
 from quadriga.drive.wish import standing
-from quadriga.shared.bus.zenoh_bus import Arrival, Bus
+from quadriga.shared.bus.session import Arrival, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
 from quadriga.shared.robot.conventions import robot_names

@@ -23,7 +23,8 @@ from quadriga.recordings.metadata import build_metadata
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.planner_kinds import find_kind
-from quadriga.shared.recording.writer import RECORDING, RecordingWriter
+from quadriga.shared.recording.metadata import RECORDING
+from quadriga.shared.recording.writer import RecordingWriter
 from quadriga.shared.runtime.atomic import atomic_write, write_text
 from quadriga.shared.runtime.places import SOURCE
 from quadriga.shared.wire.codec import encode

@@ -7,7 +7,7 @@ from typing import Final
 
 from quadriga.doctor.examine import examine
 from quadriga.faults.fault import FaultScene
-from quadriga.shared.bus.diagnosis import BAD
+from quadriga.shared.bus.diagnostics import BAD
 from quadriga.shared.errors import BusError, ConfigError
 from quadriga.shared.members import ROUTER, has_lead
 from quadriga.shared.runtime.clock import monotonic, sleep

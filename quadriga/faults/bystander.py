@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 from typing import Final
 
-from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.bus.session import Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.errors import BusError
 from quadriga.shared.members import OBSERVER

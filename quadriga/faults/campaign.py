@@ -130,7 +130,5 @@ def describe_row(row: dict[str, Any]) -> str:
     for name, title in _TIMES:
         if row[name]:
             parts.append(f"{title} {row[name]} ms")
-    if "forged" in row:
-        parts.append(f"refused {row['refused']} of {row['forged']}")
     parts += [f"{name}: {what}" for name, what in row["status"].items() if what != "walk"]
     return "; ".join(parts)

@@ -13,7 +13,6 @@ from quadriga.faults.link_faults import LINK_FAULTS, LINK_WORDS, LINKS
 from quadriga.faults.load_faults import LOAD_FAULTS
 from quadriga.faults.process_faults import PROCESS_FAULTS
 from quadriga.faults.restart_faults import RESTART_FAULTS
-from quadriga.faults.security.attack_faults import ATTACK_FAULTS
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError, did_you_mean
 from quadriga.tables import Table
@@ -26,7 +25,6 @@ FAULTS: Final = (
     *CLOCK_FAULTS,
     *COMPONENT_FAULTS,
     *LINK_FAULTS,
-    *ATTACK_FAULTS,
 )
 """In the order of the table."""
 BY_NAME: Final = {fault.name: fault for fault in FAULTS}

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Container, Iterator
 from pathlib import Path
 
-from quadriga.shared.recording.mcap_chunk import ChunkEntry
-from quadriga.shared.recording.reader import Recording
+from quadriga.shared.recording.reader import ChunkEntry, Recording
 
 
 class ContinuedRecording(Recording):

@@ -31,10 +31,6 @@ class Draw(NamedTuple):
     chosen: bool = False
 
 
-def _say_nothing() -> None:
-    return
-
-
 @dataclass(slots=True)
 class FaultScene:
     """A team that walks, as a fault finds it.
@@ -46,7 +42,6 @@ class FaultScene:
         launch: its processes.
         struck: processes that will not leave by themselves any more; they are killed at the end.
         facts: what the fault itself has to tell; they become fields of the row.
-        announce: tells the recording that the fault has come; of a stage that is `late`.
     """
 
     config: Config
@@ -55,7 +50,6 @@ class FaultScene:
     launch: Launch
     struck: set[str] = field(default_factory=set)
     facts: dict[str, Any] = field(default_factory=dict)
-    announce: Callable[[], None] = _say_nothing
 
     def name_of(self, process: str) -> str:
         """The name of a process, which is the drawn robot's in place of `OWN`."""
@@ -79,7 +73,6 @@ class Stage(NamedTuple):
         robot: whose agent or link the fault meets; "": no robot's in particular.
         detail: what the event of its beginning tells beside the fault's name.
         lasts: how long the fault goes on after `strike` has returned, s; None: it never ends.
-        late: whether `strike` waits for the fault, and tells itself when it has come.
     """
 
     config: Config
@@ -88,7 +81,6 @@ class Stage(NamedTuple):
     robot: str = ""
     detail: str = ""
     lasts: float | None = None
-    late: bool = False
 
 
 SetStage: TypeAlias = Callable[[Config, Draw, Path], AbstractContextManager[Stage]]

@@ -18,12 +18,8 @@ from quadriga.shared.robot.conventions import robot_names
 from quadriga.sim_server.world.faults import KINDS, build_components
 
 GRAMMAR: Final = "NAME or [ROBOT/]PART KIND, with --at S [--for S]"
-PARTS: Final = ("agent", "link", "radio", "clock", "certificate", "message")  # of a robot
+PARTS: Final = ("agent", "link", "radio", "clock")  # of a robot
 _EARLIEST, _LATEST = 0.001, 3600.0  # s
-# They meet no robot's own certificate.
-_OF_NO_ROBOT: Final = ("certificate-expired", "message-replayed")
-# It comes when the certificate expires that was made before the walk.
-_OF_NO_TIME: Final = "certificate-expires"
 
 
 def find_given_fault(text: str, config: Config, table: Mapping[str, TeamFault]) -> TeamFault:
@@ -36,7 +32,7 @@ def find_given_fault(text: str, config: Config, table: Mapping[str, TeamFault]) 
         table: faults by name.
 
     Raises:
-        ConfigError: there is no such fault, robot, part or kind, or one that lasts no given time.
+        ConfigError: there is no such fault, robot, part or kind.
     """
     words = text.split()
     robot, of_robot, part = words[0].rpartition("/")
@@ -48,13 +44,10 @@ def find_given_fault(text: str, config: Config, table: Mapping[str, TeamFault]) 
     times = words[1:] if named else words[2:]
     if of_robot:
         _check_robot(robot, config)
-    name = _check_kind(name, part, words, table, of_robot=bool(of_robot))
+    _check_kind(name, part, words, table)
     if len(times) not in (1, 2):
         raise ConfigError("fault", repr(text), GRAMMAR)
     start, *duration = [_seconds(word, text) for word in times]
-    if name == _OF_NO_TIME:
-        cause = "it comes when a certificate expires that was made before the walk"
-        raise ConfigError("--at", f"{start:g} with {name}", "the name alone", cause)
     fault = table[name]
     found = replace(fault, name=text, base=name, given=(robot, round(1000 * start)))
     return _lasting(found, fault, duration[0]) if duration else found
@@ -91,15 +84,11 @@ def _check_robot(robot: str, config: Config) -> None:
         raise ConfigError("fault", f"robot {robot!r}", f"one of {', '.join(known)}", cause)
 
 
-def _check_kind(
-    name: str, part: str, words: list[str], table: Mapping[str, TeamFault], *, of_robot: bool
-) -> str:
-    """The name in the table of what is asked for."""
-    if name in table and not (of_robot and name in _OF_NO_ROBOT):
-        return name
+def _check_kind(name: str, part: str, words: list[str], table: Mapping[str, TeamFault]) -> None:
+    """See that the table has what is asked for."""
+    if name in table:
+        return
     kinds = [n.partition("-")[2] for n in table if n.partition("-")[0] == part]
-    if of_robot:
-        kinds = [kind for kind in kinds if f"{part}-{kind}" not in _OF_NO_ROBOT]
     kinds = [kind for kind in kinds if kind]
     if part in LINKS:
         kinds = [*LINK_WORDS, *(kind for kind in kinds if kind not in LINK_WORDS)]

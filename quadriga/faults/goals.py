@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, Final, NamedTuple
 
 from quadriga.faults.table import with_result
-from quadriga.shared.bus.zenoh_settings import LEASE_MS
+from quadriga.shared.bus.settings import LEASE_MS
 from quadriga.shared.config.sections import Config
 from quadriga.tables import NOTHING, Table
 
@@ -70,13 +70,6 @@ def build_goal_table(config: Config, rows: Sequence[dict[str, Any]]) -> Table:
             values = [row[goal.figure] for row in tries]
             worst = None if None in values else max(values)
             lines.append(_line(f"{goal.what}, ms", len(tries), worst, goal.most(config)))
-    forged = sum(row.get("forged", 0) for row in found)
-    if forged:
-        # A try in which more is refused than was forged makes up for no other.
-        unrefused = sum(max(0, row.get("forged", 0) - row.get("refused", 0)) for row in found)
-        passed = sum(row.get("passed", 0) for row in found)
-        lines.append(_line("forgeries get through", forged, passed, 0))
-        lines.append(_line("forgeries that nobody has refused", forged, unrefused, 0))
     return Table("Goals", ("goal", "tries", "worst", "at most", "reached"), tuple(lines))
 
 

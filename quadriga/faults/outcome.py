@@ -9,8 +9,8 @@ from typing import Any, Final, NamedTuple
 from quadriga.recordings.gaps import missing_ticks
 from quadriga.recordings.traces import Traces
 from quadriga.shared.config.sections import Config
+from quadriga.shared.recording.metadata import END
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.recording.writer import END
 from quadriga.shared.wire import codes
 from quadriga.shared.wire.messages import Event, Status
 from quadriga.shared.wire.topics import STATE

@@ -32,7 +32,7 @@ whom it meets: `quadriga fault r2/agent killed --at 4`, `r2/link delay-50 --at 3
 The recording of each walk has an event when the fault begins, and one when it ends, if it does:
 those of sensors and motors on `sim/event`, all others on `injected`, in the name of the launcher
 that makes them. The begin is told {LEAD_MS} ms before, so that it is recorded even where the
-recorder is killed; that of a certificate that expires when it does. No process of the team listens.
+recorder is killed. No process of the team listens.
 
 This page is generated from the configuration and the rows that are in a folder each of
 `docs/results/faults`: `make docs`, or `python -m quadriga.faults.page > docs/faults.md`.

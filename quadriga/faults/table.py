@@ -14,7 +14,7 @@ from quadriga.tables import NOTHING, Table
 
 _COLUMNS: Final = (
     *("fault", "mode", "tries", "void", "fell"),
-    *("noticed ms", "stood ms", "again ms", "lost", "refused"),
+    *("noticed ms", "stood ms", "again ms", "lost"),
 )
 _NOTE: Final = """\
 "void": tries without a result; "fell": other robots than the one of the fault, and that one. Of
@@ -22,8 +22,7 @@ times, and of messages lost, the median and the largest of all other tries. "not
 fault until an agent no longer walked, the world said that a robot is silent or gone, or the first
 process missed the world; "stood": until all others stood or were damped; "again": until all robots
 walked for good, 0 if none had stopped. "lost": what the recording lacks, the faulty robot's own
-aside; in real time also commands of ticks that an agent did not answer. "refused": share of what
-was forged."""
+aside; in real time also commands of ticks that an agent did not answer."""
 _SAID_COLUMNS: Final = ("fault", "walked on", "stopped", "fell", "status", "doctor")
 _SAID_NOTE: Final = """\
 "walked on": all robots walked when the time was over; "stopped": somebody stopped, or was led down
@@ -68,7 +67,6 @@ def _times(every: _Rows) -> list[str]:
         str(len(every) - len(rows)),
         f"{sum(row['falls_of_others'] for row in rows)}/{sum(map(_has_own_fallen, rows))}",
         *(_median_and_most(row[name] for row in rows) for name in _FIGURES),
-        _share_refused(rows),
     ]
 
 
@@ -78,12 +76,6 @@ _FIGURES: Final = ("detect_ms", "stand_ms", "recover_ms", "lost_messages")
 def _median_and_most(values: Iterable[int | None]) -> str:
     known = [value for value in values if value is not None]
     return f"{np.median(known):.0f}/{max(known)}" if known else NOTHING
-
-
-def _share_refused(rows: _Rows) -> str:
-    forged = sum(row.get("forged", 0) for row in rows)
-    refused = sum(min(row.get("forged", 0), row.get("refused", 0)) for row in rows)
-    return f"{100 * refused / forged:.4g} %" if forged else NOTHING
 
 
 def _words(every: _Rows) -> list[str]:

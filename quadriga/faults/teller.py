@@ -9,7 +9,7 @@ from threading import Thread
 from typing import Final
 
 from quadriga.faults.fault import Stage
-from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.errors import MessageError
 from quadriga.shared.members import RECORDER
 from quadriga.shared.runtime.clock import monotonic

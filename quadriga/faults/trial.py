@@ -20,8 +20,8 @@ from quadriga.faults.outcome import Moment, describe_outcome
 from quadriga.faults.teller import LEAD_MS, FaultTeller
 from quadriga.recordings.summary import RECORDING
 from quadriga.recordings.traces import read_traces
-from quadriga.shared.bus.lead_watch import missed_ns_of
-from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.bus.liveness import missed_ns_of
+from quadriga.shared.bus.session import Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.errors import ProcessError, RecordingError
@@ -30,7 +30,7 @@ from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.atomic import write_text
 from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns
 from quadriga.shared.runtime.scheduling import go_first, leave_priority
-from quadriga.shared.wire.event_line import parse_events
+from quadriga.shared.wire.messages import parse_events
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import Launch, process_table, router_row
 from quadriga.team.run_folder import CONFIG
@@ -124,10 +124,7 @@ class _FaultTrial:
         return Moment(draw.robot, tick, at)
 
     def _announce(self, teller: FaultTeller) -> None:
-        """Tell the recording of the fault a little before it comes, or let that be told later."""
-        if self._stage.late:
-            self._scene.announce = lambda: teller.tell_begin(teller.read_clock())
-            return
+        """Tell the recording of the fault a little before it comes."""
         tick = self._scene.draw.tick
         self._await_tick(teller, max(1, tick - LEAD_MS))
         teller.tell_begin(tick)

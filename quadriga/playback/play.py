@@ -14,7 +14,7 @@ from quadriga.keyboard import Keyboard
 from quadriga.playback.timeline import Timeline
 from quadriga.playback.transport import Transport
 from quadriga.progress import build_progress
-from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.config.sections import BusConfig
 from quadriga.shared.errors import BusError, ConfigError
 from quadriga.shared.members import OPERATOR, PLANNER, SIM

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Final, Self
 
 from quadriga.shared.errors import RecordingError
-from quadriga.shared.recording.admission import Admission
-from quadriga.shared.recording.mcap_chunk import name_of
-from quadriga.shared.recording.sequence import lost_by_key
+from quadriga.shared.recording.quota import Quota
+from quadriga.shared.recording.reader import name_of
+from quadriga.shared.recording.ticks import lost_by_key
 from quadriga.shared.recording.writer import RecordingWriter
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.wire.topics import STATE
@@ -39,7 +39,7 @@ class Parts:
     Attributes:
         paths: the files so far.
         messages: how many were written to all of them.
-        admission: what is not written to any.
+        quota: what is not written to any.
     """
 
     def __init__(
@@ -50,7 +50,7 @@ class Parts:
         periods: Mapping[str, int],
         limits: Limits = Limits(),
         now: Callable[[], float] = monotonic,
-        admission: Admission | None = None,
+        quota: Quota | None = None,
     ) -> None:
         """Create the first file.
 
@@ -59,7 +59,7 @@ class Parts:
         """
         self._metadata, self._chunk_kib, self._periods = dict(metadata), chunk_kib, periods
         self._path, self._limits, self._now = path, limits, now
-        self.admission = admission or Admission()
+        self.quota = quota or Quota()
         self._split = limits != Limits()
         if self._split:
             self._refuse_later(path)
@@ -98,11 +98,11 @@ class Parts:
         """How many were written to all files."""
         return self._messages + self._writer.messages
 
-    def pass_over(self, key: str, count: int) -> None:
+    def skip(self, key: str, count: int) -> None:
         """Of a key's missing messages `count` were never sent."""
         track = self._writer.tracks.get(key)
         if track is not None:
-            track.pass_over(count)
+            track.skip(count)
 
     def count_lost(self) -> dict[str, int]:
         """By key, messages that did not come, of all files."""
@@ -143,12 +143,7 @@ class Parts:
         path = self._path.with_name(stem + self._path.suffix)
         about = self._metadata | ({"part": str(number)} if self._split else {})
         writer = RecordingWriter(
-            path,
-            about,
-            self._chunk_kib,
-            periods=self._periods,
-            after=after,
-            admission=self.admission,
+            path, about, self._chunk_kib, periods=self._periods, after=after, quota=self.quota
         )
         self.paths.append(path)
         return writer

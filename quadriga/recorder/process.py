@@ -12,16 +12,17 @@ from quadriga.recorder.parts import Parts
 from quadriga.recorder.selection import KeyFilter, Selection
 from quadriga.recorder.session import Session
 from quadriga.recordings.metadata import CONTINUES, build_metadata
-from quadriga.shared.bus.barrier import REJOINS, await_members, join, members
-from quadriga.shared.bus.introduction import Introduction
-from quadriga.shared.bus.lead_watch import loss_error
-from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
+from quadriga.shared.bus.discovery import REJOINS, await_members, join
+from quadriga.shared.bus.liveness import loss_error
+from quadriga.shared.bus.membership import members
+from quadriga.shared.bus.process_info import ProcessInfo
+from quadriga.shared.bus.session import HERE, READY, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
 from quadriga.shared.errors import ProcessError, RecordingError, system_reason
 from quadriga.shared.members import RECORDER, has_lead
-from quadriga.shared.recording.admission import LARGEST, Admission
-from quadriga.shared.recording.writer import END
+from quadriga.shared.recording.metadata import END
+from quadriga.shared.recording.quota import LARGEST, Quota
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.runtime.scheduling import precede_ordinary, take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
@@ -42,7 +43,7 @@ class RecordedFiles:
         paths: the files.
         messages: how many are in them.
         lost: by key, messages that did not come.
-        refused: by reason, messages that were not stored, see `Admission`.
+        refused: by reason, messages that were not stored, see `Quota`.
         error: what vanished while the team walked; None: the walk's end was announced, or the team
             walks on without this recorder.
     """
@@ -96,7 +97,7 @@ def run(
                 paths = parts.paths
                 _subscribe(bus, keys)
                 session = Session(bus, parts, keys, config, stopped, say)
-                me = None if selection.at_once else Introduction(bus, config, predictor_sha256)
+                me = None if selection.at_once else ProcessInfo(bus, config, predictor_sha256)
                 role = _join(bus, config, stopped, me)
                 _schedule(config)
                 if role == MEMBER:
@@ -134,7 +135,7 @@ def _open_parts(
         config.recorder.chunk_kib,
         periods(config),
         selection.limits,
-        admission=Admission(keys.own.__contains__),
+        quota=Quota(keys.own.__contains__),
     )
 
 
@@ -156,7 +157,7 @@ def _subscribe(bus: Bus, keys: KeyFilter) -> None:
 
 def _list_files(parts: Parts, ending: ProcessError | None) -> RecordedFiles:
     return RecordedFiles(
-        tuple(parts.paths), parts.messages, parts.count_lost(), parts.admission.refused, ending
+        tuple(parts.paths), parts.messages, parts.count_lost(), parts.quota.refused, ending
     )
 
 
@@ -166,13 +167,13 @@ def _note_end(parts: Parts, session: Session) -> ProcessError | None:
     if loss is None:
         return None
     tick = max(parts.last_tick(), 0)
-    error = loss_error(loss, tick, session.loss_ns, session.note)
+    error = loss_error(loss, tick, session.loss_ns)
     detail, missed = f"{error.name}: {error.got}", str(session.loss_ns)
     parts.note(END, {"code": loss.code, "detail": detail, "tick": str(tick), "missed_ns": missed})
     return error
 
 
-def _join(bus: Bus, config: Config, stopped: Callable[[], bool], me: Introduction | None) -> str:
+def _join(bus: Bus, config: Config, stopped: Callable[[], bool], me: ProcessInfo | None) -> str:
     """How this recorder takes part: `MEMBER`, `LATE`, or "" if it was stopped before.
 
     `me` is what it says of itself; None of one that waits for nobody.
@@ -191,7 +192,7 @@ def _join(bus: Bus, config: Config, stopped: Callable[[], bool], me: Introductio
     walking, doubled = has_lead(bus.members_at(READY)), RECORDER in bus.members_at(HERE)
     if walking or doubled or not config.recorder.enabled:
         return LATE
-    joined = join(bus, config, stopped, me)
+    joined = join(bus, config, stopped, me, rejoins=True)
     if joined == REJOINS:  # a busy machine has let it know late that the team walks
         bus.withdraw()
         return LATE

@@ -9,14 +9,14 @@ from typing import Final
 from quadriga.recorder.parts import Parts
 from quadriga.recorder.selection import KeyFilter
 from quadriga.recorder.starvation import Starvation
-from quadriga.shared.bus.lead_watch import LAST_WORDS, Loss, LossWatch, find_loss
-from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.bus.liveness import LAST_PACKETS, Loss, LossTimer, find_loss
+from quadriga.shared.bus.session import Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
 from quadriga.shared.members import PLANNER, plant_name
-from quadriga.shared.recording.admission import OVERSIZED
-from quadriga.shared.recording.mcap_chunk import name_of
-from quadriga.shared.recording.passed_over import PassedOver
+from quadriga.shared.recording.quota import OVERSIZED
+from quadriga.shared.recording.reader import name_of
+from quadriga.shared.recording.ticks import SkippedTicks
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.clock import log_ns, monotonic, sleep
 from quadriga.shared.runtime.scheduling import take_priority
@@ -60,8 +60,8 @@ class Session:
         self._flushed = self._begun = monotonic()
         self._ended = self._seen = self._announced = self._drops = False
         self._hurries = config.world.mode == "lockstep"  # then it does from the start
-        self._passed_over = PassedOver(config)
-        self._losses = LossWatch(lambda: find_loss(bus, config), config, grace=0.0)
+        self._passed_over = SkippedTicks(config)
+        self._losses = LossTimer(lambda: find_loss(bus, config), config, grace=0.0)
 
     def record(self, *, late: bool, seen: bool) -> None:
         """Record until the end; a late recorder reports what it has once it knows.
@@ -73,13 +73,9 @@ class Session:
         self._seen = seen
         self._say(f"recording team {self._bus.team!r} to {self._parts.paths[0]}")
         self._flushed = self._begun = monotonic()
-        still = self._bus.standstill
-        still.begin()
-        starvation, stood = Starvation(self._begun), still.total
+        starvation = Starvation(self._begun)
         while not (self._stopped() or self._ended):
             self._take(max(0.0, self._flushed + FLUSH - monotonic()))
-            if still.total > stood:  # which no priority would have helped
-                starvation, stood = Starvation(monotonic()), still.total
             if starvation.look(monotonic()):
                 self._hurry()
             if late and monotonic() - self._begun > _LOOK and self._parts.messages:
@@ -121,20 +117,15 @@ class Session:
         begun = monotonic()
         while monotonic() < begun + DRAIN_LIMIT:
             some = self._take(QUIET)
-            if not some and (self.find_unannounced() is None or monotonic() > begun + LAST_WORDS):
+            if not some and (self.find_unannounced() is None or monotonic() > begun + LAST_PACKETS):
                 break
-        self._parts.admission.refused[OVERSIZED] += self._bus.oversized
+        self._parts.quota.refused[OVERSIZED] += self._bus.oversized
         if self._bus.dropped:
             self._say(f"{self._bus.dropped:,} messages were dropped before they were recorded")
 
     def find_unannounced(self) -> Loss | None:
         """What has vanished without an announced end of the walk; None if nothing has."""
         return find_loss(self._bus, self._config) if self._seen and not self._announced else None
-
-    @property
-    def note(self) -> str:
-        """What this process has to say of itself where others are missing."""
-        return self._bus.standstill.note
 
     @property
     def loss_ns(self) -> int:
@@ -154,7 +145,7 @@ class Session:
                 if key == self._event_key:
                     self._note_event(payload)
                 elif passed := self._passed_over.find(key, payload):
-                    self._parts.pass_over(*passed)
+                    self._parts.skip(*passed)
             self._tend()
         self._tend()
         return bool(packets)
@@ -172,7 +163,7 @@ class Session:
         if self._bus.dropped and not self._drops:
             self._drops = True
             self._say("this computer is too busy to record all: messages are dropped from now on")
-        gone = self._losses.look() is not None
+        gone = self._losses.poll() is not None
         self._ended = self._seen and gone
         self._seen = self._seen or self._losses.since is None
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Container, Iterator
 from typing import Final
 
-from quadriga.shared.recording.mcap_chunk import ChunkEntry
-from quadriga.shared.recording.reader import Recording
+from quadriga.shared.recording.reader import ChunkEntry, Recording
 
 # Links differ in speed, so messages of one tick stand apart in the file, though in lock-step
 # never by more than the world does while a message is under way.

@@ -17,10 +17,9 @@ from quadriga.recordings.readable import open_readable
 from quadriga.shared.errors import MessageError, RecordingError
 from quadriga.shared.printable import printable_line
 from quadriga.shared.recording.config import recorded_config
-from quadriga.shared.recording.mcap_chunk import ChunkEntry
-from quadriga.shared.recording.reader import Recording
-from quadriga.shared.recording.salvage import Salvage
-from quadriga.shared.recording.writer import COUNTS
+from quadriga.shared.recording.metadata import COUNTS
+from quadriga.shared.recording.reader import ChunkEntry, Recording
+from quadriga.shared.recording.recover import DamagedRecording
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.topics import Topic, find_topic
 from quadriga.tables import align_columns
@@ -106,7 +105,7 @@ def _decode_valid(
 
 
 def _check_whole(
-    source: Recording | Salvage, error: RecordingError | None, messages: int
+    source: Recording | DamagedRecording, error: RecordingError | None, messages: int
 ) -> Finding:
     """Whether the file is as it was written."""
     whole = Finding("whole", "messages", messages)

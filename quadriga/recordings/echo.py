@@ -9,7 +9,7 @@ import numpy as np
 
 from quadriga.shared.errors import MessageError
 from quadriga.shared.printable import printable_line
-from quadriga.shared.recording.mcap_chunk import ChunkEntry
+from quadriga.shared.recording.reader import ChunkEntry
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.topics import topic_of
 

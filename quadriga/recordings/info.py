@@ -9,9 +9,9 @@ from quadriga.recordings.survey import Survey, type_of
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import departures
 from quadriga.shared.planner_kinds import absent_origin
-from quadriga.shared.recording.admission import describe_refused
-from quadriga.shared.recording.sequence import TickTrack
-from quadriga.shared.recording.writer import END
+from quadriga.shared.recording.metadata import END
+from quadriga.shared.recording.quota import describe_refused
+from quadriga.shared.recording.ticks import TickTrack
 from quadriga.shared.robot.robots import ROBOTS
 from quadriga.shared.runtime.clock import format_local
 from quadriga.tables import NOTHING, align_columns

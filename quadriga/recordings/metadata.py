@@ -15,7 +15,7 @@ from quadriga.shared.config.write import config_sha256
 from quadriga.shared.controller_line import controller_origin
 from quadriga.shared.planner_kinds import describe_plugin, installed_kinds, plugin_origin
 from quadriga.shared.recording.config import PLUGIN
-from quadriga.shared.recording.writer import COUNTS
+from quadriga.shared.recording.metadata import COUNTS
 from quadriga.shared.runtime.installed import package_versions
 
 CONTINUES: Final = "continues"  # of a recording: the file beside it that it goes on from

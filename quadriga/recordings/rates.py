@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
-from quadriga.shared.recording.mcap_chunk import ChunkEntry, name_of
-from quadriga.shared.recording.passed_over import PassedOver
-from quadriga.shared.recording.sequence import TickTrack
+from quadriga.shared.recording.reader import ChunkEntry, name_of
+from quadriga.shared.recording.ticks import SkippedTicks, TickTrack
 from quadriga.tables import NOTHING, align_columns, format_number
 
 _HEADS = ("key", "messages", "per world s", "world ms", "per wall s", "wall ms", "lost")
@@ -69,7 +68,7 @@ class Rates:
     """
 
     def __init__(self, config: Config) -> None:
-        self._periods, self._passed_over = periods(config), PassedOver(config)
+        self._periods, self._passed_over = periods(config), SkippedTicks(config)
         self._rates: dict[str, KeyRate] = {}
         self._tracks: dict[str, TickTrack] = {}
 
@@ -82,7 +81,7 @@ class Rates:
         track.note(entry.tick)
         passed = self._passed_over.find(entry.key, entry.payload)
         if passed is not None and passed[0] in self._tracks:
-            self._tracks[passed[0]].pass_over(passed[1])
+            self._tracks[passed[0]].skip(passed[1])
         rate = self._rates.get(entry.key)
         if rate is None:
             at = entry.tick, entry.log_time_ns

@@ -12,11 +12,12 @@ from quadriga.recordings.metadata import read_counts
 from quadriga.recordings.readable import config_or_default, open_readable
 from quadriga.shared.config.timing import periods
 from quadriga.shared.errors import RecordingError, name_file_errors
-from quadriga.shared.recording.admission import Admission
+from quadriga.shared.recording.metadata import END, LOST, PROFILE
+from quadriga.shared.recording.quota import Quota
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.recording.salvage import Damage, Salvage
-from quadriga.shared.recording.sequence import TickTrack
-from quadriga.shared.recording.writer import END, LOST, PROFILE, RecordingWriter
+from quadriga.shared.recording.recover import Damage, DamagedRecording
+from quadriga.shared.recording.ticks import TickTrack
+from quadriga.shared.recording.writer import RecordingWriter
 from quadriga.shared.runtime.clock import wall_ns
 from quadriga.tables import align_columns
 
@@ -74,7 +75,7 @@ def recover(path: Path, out: Path | None) -> Recovery | None:
     with (
         name_file_errors(RecordingError, out, "room for the recovered file"),
         RecordingWriter(
-            out, source.metadata, periods=expected, admission=Admission(_all, sys.maxsize)
+            out, source.metadata, periods=expected, quota=Quota(_all, sys.maxsize)
         ) as writer,
     ):
         for entry in source.entries():
@@ -142,7 +143,7 @@ def _format_duration(damage: Damage) -> str:
     return f", {(last - first) / 1e9:.3f} s of wall time"
 
 
-def _describe_source(source: Salvage, path: Path) -> dict[str, str]:
+def _describe_source(source: DamagedRecording, path: Path) -> dict[str, str]:
     return {
         "from": path.name,
         "at_ns": str(wall_ns()),

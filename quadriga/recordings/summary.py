@@ -28,8 +28,8 @@ from quadriga.recordings.traces import (
     tracking_errors,
 )
 from quadriga.recordings.truth import distance
+from quadriga.shared.recording.metadata import END, LOST, RECORDING
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.recording.writer import END, LOST, RECORDING
 from quadriga.shared.robot.conventions import OUTPUTS, Array
 from quadriga.shared.runtime.atomic import write_text
 from quadriga.shared.runtime.histogram import QUANTILES

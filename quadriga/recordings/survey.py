@@ -12,10 +12,9 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
 from quadriga.shared.errors import MessageError, RecordingError
 from quadriga.shared.recording.config import recorded_config
-from quadriga.shared.recording.mcap_chunk import ChunkEntry, name_of
-from quadriga.shared.recording.passed_over import PassedOver
-from quadriga.shared.recording.salvage import Damage
-from quadriga.shared.recording.sequence import TickTrack
+from quadriga.shared.recording.reader import ChunkEntry, name_of
+from quadriga.shared.recording.recover import Damage
+from quadriga.shared.recording.ticks import SkippedTicks, TickTrack
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.messages import Event, Message, Status
 from quadriga.shared.wire.topics import AGENT_EVENT, EVENT, INJECTED, STATUS, TABLE, topic_of
@@ -101,7 +100,7 @@ def type_of(key: str) -> str:
 
 
 def _read(entries: Iterator[ChunkEntry], config: Config) -> dict[str, Any]:
-    every, passed_over = periods(config), PassedOver(config)
+    every, passed_over = periods(config), SkippedTicks(config)
     tracks: dict[str, TickTrack] = {}
     kinds: dict[str, type[Message] | None] = {}
     first = last = invalid = 0
@@ -117,7 +116,7 @@ def _read(entries: Iterator[ChunkEntry], config: Config) -> dict[str, Any]:
         last = max(last, log_time)
         passed = passed_over.find(key, payload)
         if passed is not None and passed[0] in tracks:
-            tracks[passed[0]].pass_over(passed[1])
+            tracks[passed[0]].skip(passed[1])
         kind = kinds[key]
         if kind is None:
             continue

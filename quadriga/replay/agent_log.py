@@ -8,14 +8,13 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from quadriga.agents.agent import Agent
-from quadriga.agents.inbox.inbox import Inbox, Order, Source, decode_packet, order_of, state_gate
+from quadriga.agents.inbox.inbox import Inbox, Order, Source, decode_packet, order_of
 from quadriga.agents.inbox.intake_log import ANYONE
 from quadriga.agents.teammates import concerns_agents
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import RecordingError
 from quadriga.shared.planner_kinds import find_kind
-from quadriga.shared.recording.mcap_chunk import ChunkEntry
-from quadriga.shared.recording.reader import Recording
+from quadriga.shared.recording.reader import ChunkEntry, Recording
 from quadriga.shared.wire.messages import Consumed, Event
 from quadriga.shared.wire.topics import (
     COMMAND,
@@ -41,7 +40,6 @@ class AgentLog:
 
     Attributes:
         states: own sensors by tick, all payloads of a tick in the order of the file.
-        early: likewise, those that were ahead of all that the agent believed.
         received: everything else it may have taken in: packets of each source by order.
         records: what it reported that it took in, by tick.
         sent: commands, measurements and own plans by topic and order, payloads as above.
@@ -52,7 +50,6 @@ class AgentLog:
     """
 
     states: dict[int, list[bytes]] = field(default_factory=lambda: defaultdict(list))
-    early: dict[int, list[bytes]] = field(default_factory=lambda: defaultdict(list))
     received: dict[Source, dict[Order, list[Packet]]] = field(
         default_factory=lambda: defaultdict(lambda: defaultdict(list))
     )
@@ -90,8 +87,6 @@ def read_agent_log(
             handlers[entry.key](entry)
         if count % _REPORT_AFTER == 0:
             progress(entry.tick)
-    for tick, payloads in log.early.items():  # the agent answered what came in time, if it did
-        log.states[tick] += payloads
     # A forged tick must not ask for years of steps.
     log.last = min(log.last, max(log.states, default=-1))
     _check_complete(log, recording, config, agent.robot)
@@ -119,7 +114,7 @@ def _build_handlers(
         if topic is not STATE:
             sent_by = ANYONE if topic in WORDS else sender
             handlers[key] = _keep_received(log, topic, sent_by)
-    handlers[STATE.key(team, robot)] = _keep_states(log, config)
+    handlers[STATE.key(team, robot)] = _keep_states(log)
     handlers[COMMAND.key(team, robot)] = keep_command
     handlers[INPUTS.key(team, robot)] = keep_record
     handlers[MEASUREMENT.key(team, robot)] = _keep_sent(log, MEASUREMENT)
@@ -130,12 +125,9 @@ def _build_handlers(
     return handlers
 
 
-def _keep_states(log: AgentLog, config: Config) -> Callable[[ChunkEntry], None]:
-    gate = state_gate(config)
-
+def _keep_states(log: AgentLog) -> Callable[[ChunkEntry], None]:
     def keep(entry: ChunkEntry) -> None:
-        in_time = entry.tick <= gate.newest or gate.take(entry.tick)
-        (log.states if in_time else log.early)[entry.tick].append(entry.payload)
+        log.states[entry.tick].append(entry.payload)
 
     return keep
 

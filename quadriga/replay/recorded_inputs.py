@@ -99,7 +99,6 @@ class RecordedInputs:
 
     def _take_state(self, tick: int) -> State | None:
         """The first valid state of a tick: the agent would not have stepped at a second one."""
-        self._inbox.trust_state(tick)
         for payload in self._log.states.pop(tick, ()):
             self._inbox.take(self._state_key, payload)
             state = self._inbox.pop_state()

@@ -14,8 +14,7 @@ from quadriga.replay.difference import Difference, find_difference
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError, RecordingError
 from quadriga.shared.recording.config import recorded_config
-from quadriga.shared.recording.mcap_chunk import ChunkEntry
-from quadriga.shared.recording.reader import M, Recording
+from quadriga.shared.recording.reader import ChunkEntry, M, Recording
 from quadriga.shared.wire import codes
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.messages import Command, Event, Message

@@ -14,11 +14,10 @@ from quadriga.recordings.rates import RateFigures, Rates
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
 from quadriga.shared.members import LEADS
-from quadriga.shared.recording.mcap_chunk import ChunkEntry
+from quadriga.shared.recording.reader import ChunkEntry
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.event_line import format_event
-from quadriga.shared.wire.messages import Event, Message, Status
+from quadriga.shared.wire.messages import Event, Message, Status, format_event
 from quadriga.shared.wire.topics import CLOCK, STATUS, find_topic
 from quadriga.status.record import Account, Costs, TeamReading
 

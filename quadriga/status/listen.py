@@ -10,18 +10,18 @@ from pathlib import Path
 from typing import Final
 
 from quadriga.doctor.health import Health, judge_team
-from quadriga.doctor.watch_team import RecentRefusals, WalkEnd
-from quadriga.shared.bus.absence import TeamView
-from quadriga.shared.bus.inquiry import ask, view_of
-from quadriga.shared.bus.introduction import describe_process
-from quadriga.shared.bus.roster import processes
-from quadriga.shared.bus.zenoh_bus import HERE, Arrival, Bus
+from quadriga.doctor.watch_team import WalkEnd
+from quadriga.shared.bus.diagnostics import TeamView
+from quadriga.shared.bus.discovery import ask, view_of
+from quadriga.shared.bus.membership import processes
+from quadriga.shared.bus.process_info import describe_process
+from quadriga.shared.bus.session import HERE, Arrival, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
 from quadriga.shared.members import OBSERVER
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns, sleep
 from quadriga.shared.runtime.process_use import read_use
-from quadriga.shared.wire.envelope import envelope
+from quadriga.shared.wire.codec import envelope
 from quadriga.shared.wire.topics import TABLE
 from quadriga.status.gather import StatusFold
 from quadriga.status.judge import find_problems
@@ -46,7 +46,6 @@ class TeamListener:
         self._config, self._bus = config, bus
         self._team = processes(config)
         self._fold, self._end = StatusFold(config), WalkEnd(bus)
-        self._refusals = RecentRefusals(bus)
         fast = periods(config)
         keys = {
             topic.key(bus.team, "*")
@@ -84,7 +83,7 @@ class TeamListener:
             view = view_of(bus, config, ask(bus), describe_process(config, OBSERVER))
             self._view = view
         here = bus.members_at(HERE)
-        health = {of.name: of for of in judge_team(self._team, view, self._refusals.recent())}
+        health = {of.name: of for of in judge_team(self._team, view)}
         reading = self._fold.look(monotonic_ns())
         members = tuple(
             MemberStatus(

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
-from quadriga.shared.bus.zenoh_bus import Arrival, Bus
+from quadriga.shared.bus.session import Arrival, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.members import OBSERVER
 from quadriga.shared.robot.conventions import robot_names

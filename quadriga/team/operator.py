@@ -12,9 +12,9 @@ from quadriga.drive.client import socket_path
 from quadriga.drive.controls import DriveControls
 from quadriga.drive.server import DriveServer
 from quadriga.shared import members
-from quadriga.shared.bus.barrier import REJOINS, join
-from quadriga.shared.bus.lead_watch import LeadWatch
-from quadriga.shared.bus.zenoh_bus import POLL, READY, Bus
+from quadriga.shared.bus.discovery import REJOINS, join
+from quadriga.shared.bus.liveness import Liveness
+from quadriga.shared.bus.session import POLL, READY, Bus
 from quadriga.shared.config.reference import BY_HAND
 from quadriga.shared.config.reference_trace import trace_of
 from quadriga.shared.config.sections import Config
@@ -24,16 +24,13 @@ from quadriga.shared.runtime.scheduling import at_work
 from quadriga.shared.runtime.signals import stop_on_signals
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.messages import Clock, Event, Reference
-from quadriga.shared.wire.tick_gate import TickGate
 from quadriga.shared.wire.topics import CLOCK, EVENT, REFERENCE
 from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS as EPOCH_MS
 from quadriga.team.driven import LOOK, DrivenReferences
 
 _AHEAD: Final = 4  # epochs; agents in lock-step wait for the one in force
 _DRIVEN_AHEAD: Final = 1  # likewise, of who is driven by hand in real time: not to be felt
-# Of the clock's tick against the newest; a longer jump must be confirmed. References of such a lead
-# are still believed: see `agents.planning.operator_references.AHEAD_MS`.
-_GAP_MS: Final = 500
+_GAP_MS: Final = 500  # at most, by which an announced end is ahead of the clock
 
 
 def reference_at(config: Config, tick: int) -> Reference:
@@ -89,7 +86,7 @@ def run(config: Config, stopped: Callable[[], bool] | None = None, view: str = "
                 # The token drives the team, and this may be a log that others read.
                 page = server.url.partition("?")[0]
                 print(f"page to drive from: {page}; `quadriga drive` tells its token", flush=True)
-            joined = join(bus, config, stopped)
+            joined = join(bus, config, stopped, rejoins=True)
             if not joined:
                 return
             with at_work(config.runtime.priority):  # without a reference the robots stop
@@ -110,7 +107,7 @@ class _Operator:
         # more, as a frozen recorder, would hold up the router, and so everybody else.
         realtime = config.world.mode == "realtime"
         self._put = bus.publisher(REFERENCE.key(bus.team), droppable=realtime)
-        self._bus, self._watch = bus, LeadWatch(bus, config)
+        self._bus, self._watch = bus, Liveness(bus, config)
         self._time = TeamTicks(bus, round(1000 * config.world.seconds))
         controls.time = lambda: (self._time.tick, 1_000_000 * self._time.tick)
         self._controls = controls
@@ -147,16 +144,13 @@ class _Operator:
     def _follow(self) -> None:
         """Take in the team's time; see who is gone where there is none."""
         if self._time.follow(self._look):
-            self._watch.hear()
+            self._watch.receive()
         else:
-            self._watch.look(self._time.tick)
+            self._watch.poll(self._time.tick)
 
 
 class TeamTicks:
     """The team's time, as whoever drives it tells it.
-
-    Anybody might have sent what is heard: a tick that the walk never comes to is not believed, nor
-    one that jumps, unless another goes on from it.
 
     Args:
         bus: subscribed to the clock and to events.
@@ -168,19 +162,19 @@ class TeamTicks:
 
     def __init__(self, bus: Bus, last: int) -> None:
         self._bus, self._last = bus, last
-        self._gate = TickGate(_GAP_MS, last)
+        self._newest = -1  # tick of the clock
         self._end = 0  # tick that was announced
         self.over = False
 
     @property
     def known(self) -> bool:
         """Whether the time has been heard."""
-        return self._gate.newest >= 0
+        return self._newest >= 0
 
     @property
     def tick(self) -> int:
         """As far as time has come."""
-        return max(self._gate.newest, 0)
+        return max(self._newest, 0)
 
     def follow(self, patience: float = POLL) -> bool:
         """Take in what has come; False if for `patience` seconds nothing has.
@@ -204,8 +198,8 @@ class TeamTicks:
     def _take_tick(self, tick: int) -> None:
         if self.over and tick <= self._end:
             return
-        if tick <= self._last and self._gate.take(tick):
-            self.over = False
+        if self._newest < tick <= self._last:
+            self._newest, self.over = tick, False
 
     def _take_event(self, event: Event) -> None:
         """The end, if the team can have come to its tick."""

@@ -11,8 +11,8 @@ from rich.console import Console
 from quadriga.plant.deadlines import MODE as REALTIME
 from quadriga.progress import build_progress
 from quadriga.recordings.late_commands import late_shares, overloaded
-from quadriga.shared.bus.roster import members
-from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
+from quadriga.shared.bus.membership import members
+from quadriga.shared.bus.session import HERE, READY, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
 from quadriga.shared.members import LAUNCHER, LEADS

@@ -4,21 +4,18 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
 from typing import Final
 
-from quadriga.shared.bus.barrier import lead
-from quadriga.shared.bus.zenoh_bus import POLL, READY, Bus
-from quadriga.shared.bus.zenoh_settings import link_settings
+from quadriga.shared.bus.membership import lead
+from quadriga.shared.bus.session import POLL, READY, Bus
+from quadriga.shared.bus.settings import link_settings
 from quadriga.shared.config.endpoints import is_tls
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.runtime.scheduling import take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
-from quadriga.team.audit import Audit, RefusalLog
-from quadriga.team.router_rules import revoked_numbers, router_rules
-from quadriga.team.rule_check import check_rules
+from quadriga.shared.security.access import router_rules
 
 _STAGES: Final = 3  # waits of the barrier: for the router, for everyone's presence, for readiness
 
@@ -33,8 +30,7 @@ def run(
 ) -> None:
     """Route until SIGINT or SIGTERM, or until one walk is over.
 
-    Where it listens with certificates, it lets through what the team's rights permit, tells what it
-    refuses, and serves only once it has seen that this is so.
+    Where it listens with certificates, it lets through what the team's rights permit.
 
     Args:
         config: the team's configuration.
@@ -46,38 +42,20 @@ def run(
     Raises:
         ConfigError: an endpoint is open to others, a certificate is missing, or routers are to be
             linked that have certificates or leave after a walk.
-        BusError: the endpoint cannot be opened, or its rules are not in force; or, with `once`, the
-            team did not assemble.
+        BusError: the endpoint cannot be opened; or, with `once`, the team did not assemble.
     """
     if once and links:
         cause = "linked routers would wait for each other to leave"
         raise ConfigError("--once", "with --link", "one of the two", cause)
     stopped = stopped or stop_on_signals()
-    with ExitStack() as stack:
-        bus, tell = _open(stack, config, listen, links)
+    given = link_settings(config.bus, listen, links)
+    if is_tls(listen):
+        given |= router_rules(config)
+    with Bus.route(listen, config.team.name, config.bus, given) as bus:
         take_priority(config.runtime.priority)  # every command waits for it
         print(f"routing at {listen}", file=sys.stderr, flush=True)
         if once:
             timeout = _STAGES * config.bus.barrier_timeout
-            bus.wait_for(READY, [lead(config)], timeout, stopped, lambda: _pause(tell))
+            bus.wait_for(READY, [lead(config)], timeout, stopped, lambda: sleep(POLL))
         while not stopped() and (bus.linked or not once):
-            _pause(tell)
-
-
-def _open(
-    stack: ExitStack, config: Config, listen: str, links: Sequence[str]
-) -> tuple[Bus, Callable[[], object]]:
-    """The router's bus, and what tells what it has refused since it was called last."""
-    team, connecting = config.team.name, link_settings(config.bus, listen, links)
-    if not is_tls(listen):
-        return stack.enter_context(Bus.route(listen, team, config.bus, connecting)), lambda: None
-    rules, log = router_rules(config), RefusalLog()
-    bus = stack.enter_context(Bus.route(listen, team, config.bus, rules))
-    audit = Audit(bus, log, revoked_numbers(config))
-    check_rules(bus, config, listen, audit.tell)
-    return bus, audit.tell
-
-
-def _pause(tell: Callable[[], object]) -> None:
-    tell()
-    sleep(POLL)
+            sleep(POLL)

@@ -8,7 +8,7 @@ from typing import Final
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.errors import ConfigError, name_file_errors
-from quadriga.shared.recording.writer import RECORDING
+from quadriga.shared.recording.metadata import RECORDING
 from quadriga.shared.runtime.clock import format_local, wall_ns
 
 RUNS: Final = Path("runs")

@@ -6,15 +6,14 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Final, Self
 
-from quadriga.shared.bus.barrier import processes
-from quadriga.shared.bus.zenoh_bus import HERE, POLL, Bus
+from quadriga.shared.bus.membership import processes
+from quadriga.shared.bus.session import HERE, POLL, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError, MessageError
 from quadriga.shared.members import AGENT, SIM
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic
-from quadriga.shared.wire.codec import decode, encode
-from quadriga.shared.wire.envelope import envelope
+from quadriga.shared.wire.codec import decode, encode, envelope
 from quadriga.shared.wire.messages import Event, Message, Status
 from quadriga.shared.wire.topic import Topic
 from quadriga.shared.wire.topics import EVENT, STATUS, topics_for

@@ -6,8 +6,8 @@ import os
 from collections.abc import Callable
 from typing import Final, NamedTuple
 
-from quadriga.shared.bus.newest import Newest
-from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.bus.ring_buffer import Newest
+from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
 from quadriga.shared.runtime.clock import Rate, monotonic

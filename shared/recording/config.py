@@ -13,7 +13,7 @@ from quadriga.shared.errors import ConfigError, RecordingError
 from quadriga.shared.planner_kinds import stand_in
 from quadriga.shared.printable import printable_line
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.recording.salvage import Salvage
+from quadriga.shared.recording.recover import DamagedRecording
 from quadriga.shared.robot.robots import ROBOTS
 
 PLUGIN: Final = (
@@ -21,7 +21,7 @@ PLUGIN: Final = (
 )
 
 
-def recorded_config(recording: Recording | Salvage) -> Config:
+def recorded_config(recording: Recording | DamagedRecording) -> Config:
     """The configuration of a recorded run.
 
     A recording holds every key, so that no default of today stands for one of then. A planner, or a

@@ -1,43 +1,66 @@
 """Reading MCAP recordings of all traffic, whole ones and such that are cut.
 
-`quadriga.shared.recording.salvage` reads what is left of a damaged one.
+`quadriga.shared.recording.recover` reads what is left of a damaged one. A file consists of
+chunks, packed with LZ4 or Zstandard, with checksums and an index.
 """
 
 from __future__ import annotations
 
+import json
+import struct
 import zlib
+from collections import Counter
 from collections.abc import Container, Iterator
 from contextlib import suppress
-from io import SEEK_CUR, SEEK_END
+from io import SEEK_CUR, SEEK_END, BytesIO
 from pathlib import Path
-from typing import BinaryIO, Final, TypeVar
+from typing import BinaryIO, Final, NamedTuple, TypeVar
 
+import lz4.frame
+import zstandard
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Chunk, DataEnd, Footer, Metadata
+from mcap.reader import make_reader
+from mcap.records import Channel, Chunk, Footer, Metadata, Schema
 from mcap.writer import MCAP0_MAGIC
 
 from quadriga.shared.errors import RecordingError, name_file_errors
-from quadriga.shared.recording.mcap_chunk import (
-    BARE,
-    CORRUPT,
-    RECORD,
-    ChunkEntry,
-    content_of,
-    messages_of,
-    stream,
-)
-from quadriga.shared.recording.seal import unseal
-from quadriga.shared.recording.writer import PROFILE
-from quadriga.shared.wire.codec import decode
+from quadriga.shared.recording.metadata import PROFILE, newer_format_error, unseal
+from quadriga.shared.wire.codec import decode, envelope
 from quadriga.shared.wire.messages import Message
-from quadriga.shared.wire.topics import TABLE, topic_of
+from quadriga.shared.wire.topics import TABLE, find_topic, topic_of
 
 M = TypeVar("M", bound=Message)
 
+RECORD: Final = struct.Struct("<BQ")  # opcode, length
+LARGEST_CHUNK: Final = 1 << 27  # bytes unpacked; `recorder.chunk_kib` is half of that at most
+# What the MCAP library, LZ4 and Zstandard raise on bytes that are no record.
+CORRUPT: Final = (
+    *(McapError, struct.error, ValueError, RuntimeError, IndexError, EOFError, MemoryError),
+    *(OverflowError, zstandard.ZstdError),
+)
+
+_MESSAGE: Final = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log, publish
+_LATEST: Final = (1 << 63) - 1  # ns: what MCAP has 64 bits for, tables have 63 and a sign
+_KNOWN: Final = {f"quadriga.{topic.type.__name__}": topic.type.SCHEMA for topic in TABLE}
 _RECOVER: Final = "`quadriga recover` writes what is readable"
 _MEND: Final = f"one cut or damaged in its first bytes: {_RECOVER}"
 _PART: Final = 1 << 20  # bytes that are read at once
-_END: Final = RECORD.size + 4 + RECORD.size + 20 + len(MCAP0_MAGIC)  # DataEnd, footer, magic
+_DATA_END: Final = RECORD.size + 4  # bytes
+_FOOTER: Final = RECORD.size + 20  # bytes
+
+
+class ChunkEntry(NamedTuple):
+    """One recorded message.
+
+    `tick` is -1 where the message carries none that can be read.
+    """
+
+    key: str
+    tick: int
+    log_time_ns: int
+    payload: bytes
 
 
 class Recording:
@@ -56,7 +79,7 @@ class Recording:
             RecordingError: no such file, an empty one, or not a recording of this project.
         """
         self.path, self.cut = path, ""
-        self.damages: tuple[()] = ()  # none can be told apart: `Salvage` does
+        self.damages: tuple[()] = ()  # none can be told apart: `DamagedRecording` does
         with (
             name_file_errors(RecordingError, path, "a recording", "did the walk start?"),
             path.open("rb") as file,
@@ -86,11 +109,14 @@ class Recording:
             RecordingError: the messages are of a schema later than this version's.
         """
         wanted: dict[int, str | None] = {}
-        for chunk in self._chunks():
+        for opcode, content in self._records(skip=Opcode.METADATA):
+            if opcode != Opcode.CHUNK:
+                continue
             try:
+                chunk = content_of(content)
                 yield from messages_of(chunk, wanted, str(self.path), names, keys)
-            except CORRUPT as error:  # of another program: its checksum is right
-                self.cut = f"a chunk holds what are no records ({error})"
+            except CORRUPT as error:
+                self.cut = f"a chunk of {len(content)} bytes is corrupt ({error})"
                 return
 
     def messages(self, kind: type[M], robot: str = "") -> Iterator[M]:
@@ -113,53 +139,56 @@ class Recording:
         if not self.complete:
             raise self._damage_error(f"a file that is cut after {self._size:,} bytes")
         with self.path.open("rb") as file:
-            file.seek(self._size - _END + RECORD.size + 4)
-            end = file.read(RECORD.size + 20)
+            file.seek(self._size - len(MCAP0_MAGIC) - _FOOTER)
+            end = file.read(_FOOTER)
             footer = Footer.read(stream(end[RECORD.size :]))
-            start = footer.summary_start or self._size - _END + RECORD.size + 4  # 0: no summary
-            if end[:1] != bytes([Opcode.FOOTER]) or not _END < start < self._size:
+            start = footer.summary_start
+            if end[:1] != bytes([Opcode.FOOTER]) or not _DATA_END < start < self._size:
                 raise self._damage_error("an index that is not where it should be")
-            file.seek(start - RECORD.size - 4)
-            if file.read(RECORD.size) != RECORD.pack(Opcode.DATA_END, 4):
+            file.seek(start - _DATA_END)
+            data_end = file.read(_DATA_END)
+            if data_end[: RECORD.size] != RECORD.pack(Opcode.DATA_END, 4):
                 raise self._damage_error("content that does not end where it should")
-            crc = DataEnd.read(stream(file.read(4))).data_section_crc
-            summary = file.read(self._size - len(MCAP0_MAGIC) - 4 - file.tell())
-            if footer.summary_crc and zlib.crc32(summary) != footer.summary_crc:
+            summary = file.read(self._size - len(MCAP0_MAGIC) - 4 - start)
+            if zlib.crc32(summary) != footer.summary_crc:
                 raise self._damage_error("an index that fails its checksum")
-            if not crc:  # then those of the chunks must do
-                for _ in self._chunks():
-                    pass
-            elif _crc(file, start - RECORD.size - 4) != crc:
+            if _crc(file, start - _DATA_END).to_bytes(4, "little") != data_end[RECORD.size :]:
                 raise self._damage_error("content that fails its checksum")
-        if self.cut:
-            raise self._damage_error(self.cut)
 
     @property
     def notes(self) -> dict[str, dict[str, str]]:
         """What the writer noted at the end, by name: `COUNTS`, `LOST` …; {} after a kill."""
         notes: dict[str, dict[str, str]] = {}
         cut = self.cut  # of the chunks, which are not read here
-        for _, content in self._records(only=Opcode.METADATA):
-            with suppress(*CORRUPT):  # of another program: its checksum is right
-                record = Metadata.read(stream(content))
-                if record.name != PROFILE:
+        for opcode, content in self._records(skip=Opcode.CHUNK):
+            with suppress(*CORRUPT):
+                if opcode == Opcode.METADATA:
+                    record = Metadata.read(stream(content))
                     notes[record.name] = dict(record.metadata)
         self.cut = cut
+        notes.pop(PROFILE, None)
         return notes
 
+    def indexed_counts(self) -> dict[str, int] | None:
+        """Messages by key, sorted, from the index alone; None of a file that is cut or damaged."""
+        with self.path.open("rb") as file:
+            try:
+                summary = make_reader(file).get_summary()
+            except (*CORRUPT, StopIteration):
+                return None
+        if summary is None or summary.statistics is None:
+            return None
+        counts: Counter[str] = Counter()
+        for number, channel in summary.channels.items():
+            counts[channel.topic] += summary.statistics.channel_message_counts.get(number, 0)
+        return dict(sorted(counts.items()))
+
     def _damage_error(self, got: str) -> RecordingError:
-        return RecordingError(
-            str(self.path),
-            got,
-            "a whole recording",
-            f"was the recorder killed, or the disk full? {_RECOVER}",
-        )
+        cause = f"was the recorder killed, or the disk full? {_RECOVER}"
+        return RecordingError(str(self.path), got, "a whole recording", cause)
 
-    def _records(self, only: Opcode | None = None) -> Iterator[tuple[int, bytes]]:
-        """Opcode and content of the records outside chunks, up to the cut if there is one.
-
-        Those that are not asked for are skipped cheaply.
-        """
+    def _records(self, skip: Opcode) -> Iterator[tuple[int, bytes]]:
+        """Opcode and content of the records, up to the cut if there is one; one kind is skipped."""
         self.cut = ""
         with self.path.open("rb") as file:
             file.seek(len(MCAP0_MAGIC))
@@ -169,27 +198,14 @@ class Recording:
                     return
                 if file.tell() + length > self._size:
                     break
-                if only is None or opcode == only:
-                    yield opcode, file.read(length)
-                else:
+                if opcode in (skip, Opcode.MESSAGE_INDEX):
                     file.seek(length, SEEK_CUR)
+                else:
+                    yield opcode, file.read(length)
         self.cut = f"the file ends at byte {self._size} in the middle of a record"
 
-    def _chunks(self) -> Iterator[bytes]:
-        """The records in each chunk, and each of those outside of any."""
-        for opcode, content in self._records():
-            if opcode in BARE:
-                yield RECORD.pack(opcode, len(content)) + content
-            elif opcode == Opcode.CHUNK:
-                try:
-                    inside = content_of(Chunk.read(stream(content)))
-                except CORRUPT as error:
-                    self.cut = f"a chunk of {len(content)} bytes is corrupt ({error})"
-                    return
-                yield inside
-
     def _metadata(self) -> dict[str, str]:
-        for opcode, content in self._records():
+        for opcode, content in self._records(skip=Opcode.MESSAGE_INDEX):
             if opcode == Opcode.METADATA:
                 try:
                     record = Metadata.read(stream(content))
@@ -205,6 +221,101 @@ class Recording:
             "a recording made by `quadriga`",
             f"a foreign MCAP file, or {_MEND}",
         )
+
+
+def messages_of(
+    chunk: bytes,
+    wanted: dict[int, str | None],
+    path: str,
+    names: Container[str] | None = None,
+    keys: Container[str] | None = None,
+) -> Iterator[ChunkEntry]:
+    """Entries of one chunk.
+
+    Args:
+        chunk: its records, uncompressed.
+        wanted: keys by channel, None for one that is not wanted; learns them as they pass by.
+        path: the file's, for the error.
+        names: of topics that are wanted; None: all, also of keys outside the table.
+        keys: that are wanted; None: all.
+
+    Raises:
+        RecordingError: the messages are of a schema later than this version's.
+        one of CORRUPT: the chunk holds what are no records.
+    """
+    at = 0
+    while at < len(chunk):
+        if chunk[at] != Opcode.MESSAGE:
+            opcode, length = RECORD.unpack_from(chunk, at)
+            at += RECORD.size
+            if opcode == Opcode.CHANNEL:
+                channel_id = int.from_bytes(chunk[at : at + 2], "little")
+                if channel_id not in wanted:  # every chunk repeats them
+                    key = Channel.read(stream(chunk[at : at + length])).topic
+                    named = names is None or name_of(key) in names
+                    wanted[channel_id] = key if named and (keys is None or key in keys) else None
+            elif opcode == Opcode.SCHEMA:
+                check_schema(Schema.read(stream(chunk[at : at + length])), path)
+            at += length
+            continue
+        _, length, channel_id, _, log_time, _ = _MESSAGE.unpack_from(chunk, at)
+        wanted_key = wanted.get(channel_id)
+        end = at + RECORD.size + length
+        if wanted_key is not None:
+            payload = chunk[at + _MESSAGE.size : end]
+            head = envelope(payload)
+            tick = -1 if head is None else head[0]
+            yield ChunkEntry(wanted_key, tick, min(log_time, _LATEST), payload)
+        at = end
+
+
+def content_of(record: bytes) -> bytes:
+    """The records in a chunk; no more is allocated than the chunk says that it unpacks to.
+
+    Raises:
+        one of CORRUPT: it is damaged, or packed with neither LZ4 nor Zstandard.
+    """
+    chunk = Chunk.read(stream(record))
+    size: int = chunk.uncompressed_size
+    if chunk.compression not in ("lz4", "zstd") or size > LARGEST_CHUNK:
+        raise ValueError(f"{size} bytes packed with {chunk.compression[:16]!r}")
+    if chunk.compression == "lz4":
+        unpack = lz4.frame.LZ4FrameDecompressor()
+        content: bytes = unpack.decompress(chunk.data, max_length=size + 1)
+    elif zstandard.frame_content_size(chunk.data) in (size, -1):
+        content = zstandard.ZstdDecompressor().decompress(chunk.data, max_output_size=size)
+    else:  # as much would be allocated as the frame says
+        raise ValueError(f"a frame that does not unpack to {size} bytes")
+    if len(content) != size:
+        raise ValueError(f"{len(content)} bytes where {size} were packed")
+    if zlib.crc32(content) != chunk.uncompressed_crc:
+        raise ValueError("its checksum is wrong")
+    return content
+
+
+def stream(content: bytes) -> ReadDataStream:
+    """The content of a record for the MCAP library."""
+    return ReadDataStream(BytesIO(content))
+
+
+def check_schema(schema: Schema, path: str) -> None:
+    """Raise RecordingError if a schema is later than this version's."""
+    mine = _KNOWN.get(schema.name)
+    if mine is None:
+        return
+    try:
+        version = json.loads(schema.data)["properties"]["schema"]["const"]
+    except (ValueError, TypeError, LookupError, RecursionError):
+        return
+    if isinstance(version, int) and version > mine:
+        got = f"messages {schema.name} of schema {version}"
+        raise newer_format_error(path, got, f"schema {mine}")
+
+
+def name_of(key: str) -> str:
+    """Name of a key's topic, "" if the table has none."""
+    topic, _ = find_topic(key)
+    return "" if topic is None else topic.name
 
 
 def _crc(file: BinaryIO, length: int) -> int:

@@ -1,46 +1,63 @@
-"""Who may send and hear what, from the table of topics; Zenoh's rules for a router.
+"""Who may send and hear what, and how much, from the table of topics; Zenoh's rules for a router.
 
-Whatever is not permitted is denied. Seen from the router, what a process sends comes in (`ingress`)
-and what it hears goes out (`egress`).
+A certificate's common name is the identity of its process. Whatever is not permitted is denied.
+Seen from the router, what a process sends comes in (`ingress`) and what it hears goes out
+(`egress`).
+
+A message that is larger than any of its type is dropped before anybody decodes it. No key has a
+rate: Zenoh's is the least time between two messages, without a burst, and what a slow link has held
+up comes at once. With ten times the rate of states up to one in 300 was dropped in real time.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, fields
+from math import prod
 from typing import Any, Final
 
+from quadriga.shared import members
 from quadriga.shared.config.sections import Config
-from quadriga.shared.members import (
-    AGENT,
-    DOCTOR,
-    LEADS,
-    OBSERVER,
-    PROBE,
-    RECORDER,
-    ROUTER,
-    SIM,
-    plant_name,
-)
+from quadriga.shared.members import AGENT, DOCTOR, LEADS, OBSERVER, RECORDER, ROLES, ROUTER
 from quadriga.shared.robot.conventions import robot_names
-from quadriga.shared.security.roll import Identity, common_name, team_roll, valid_names
 from quadriga.shared.wire.about import QUESTIONS
+from quadriga.shared.wire.codec import MAX_BYTES, MAX_TEXT
+from quadriga.shared.wire.messages import Message
 from quadriga.shared.wire.topic import Topic
 from quadriga.shared.wire.topics import CLOCK, ESTOP, RECEIVED, STATE, STATUS, TABLE, TRUTH
 
-# Keys of the questions that a router asks itself, behind `<team>/probe/`.
-ALLOWED: Final = "allowed"
-DENIED: Final = "denied"
-LARGE: Final = "large"  # what is put there is larger than permitted
-MANY: Final = "many"  # what is put there comes more often than permitted
-DEAF: Final = "deaf"  # the probe may subscribe to it, and yet hears nothing
-_PROBED: Final = (ALLOWED, LARGE, MANY)
-_OTHERS: Final = "others"  # with a certificate, but no rights
-_MOST_ROBOTS: Final = 10  # of a team, see `team.robots`
+_SPEAKERS: Final = (members.ESTOP, members.STOP, members.RESET, members.RESUME)
+_OTHERS: Final = (members.LAUNCHER, *_SPEAKERS, DOCTOR, OBSERVER, ROUTER)
+_OBSERVER_NAME: Final = re.compile(r".+-\d+")  # such as echo-4711
 
 _IN, _OUT, _BOTH = ["ingress"], ["egress"], ["ingress", "egress"]
 _HEARERS: Final = (RECORDER, OBSERVER, DOCTOR)  # they hear everything and say nothing
 _OF_LEAD: Final = (CLOCK, TRUTH)  # only who drives time knows
+
+_SPARE_SESSIONS: Final = 8  # for those who look on, and who has yet to be found dead
+# Greatest length of what has no fixed one, by its letter: samples, robots, yokes, plans, ticks.
+_LENGTHS: Final = {"N": 100, "n": 10, "k": 45, "P": 1000, "K": 10_000}
+_LISTED: Final = 16_384  # bytes of a list or a map
+_TEXT: Final = 4 * MAX_TEXT  # bytes
+_NUMBER: Final = 9  # bytes
+_FRAME: Final = 32  # bytes beside the content of a field, its name aside
+_ANSWER: Final = 256  # bytes of a question whether all has arrived, and of the answer
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """Who a certificate is for.
+
+    Attributes:
+        name: that of the process on the bus; `observer` of all who only look on.
+        role: the name of a row of the table of processes, or as `name`.
+        robot: whose process it is; "" of one that is for all.
+    """
+
+    name: str
+    role: str
+    robot: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,37 +75,51 @@ class Rights:
     hears: tuple[str, ...]
 
 
+def team_identities(config: Config) -> tuple[Identity, ...]:
+    """Everybody who may be on a team's bus, whatever it records and however it plans."""
+    team = members.team_members(
+        robot_names(config.team.robots),
+        central=True,
+        recorded=True,
+        plant_each=config.team.plants == "each",
+    )
+    foreign = {name for topic in TABLE for name in (*topic.senders, *topic.receivers)}
+    foreign -= {*_OTHERS, *(role.name for role in ROLES)}
+    return (
+        *(Identity(member.name, member.role.name, member.robot) for member in team),
+        *(Identity(name, name) for name in (*_OTHERS, *sorted(foreign))),
+    )
+
+
+def identity_of(process: str) -> str:
+    """The identity of a process by its name on the bus; those who look on end in their number."""
+    return OBSERVER if _OBSERVER_NAME.fullmatch(process) else process
+
+
 def team_rights(config: Config) -> tuple[Rights, ...]:
-    """The rights of everybody on a team's roll but the router, which enforces them."""
+    """The rights of everybody who may be on a team's bus but the router, which enforces them."""
     team, robots = config.team.name, robot_names(config.team.robots)
     return tuple(
         Rights(who, _published(who, team, robots), _heard(who, team))
-        for who in team_roll(config)
+        for who in team_identities(config)
         if who.role != ROUTER
     )
 
 
-def access_control(config: Config, revoked: Mapping[str, int]) -> dict[str, Any]:
-    """Zenoh's `access_control`: everything denied but what the team's rights permit.
+def router_rules(config: Config) -> dict[str, Any]:
+    """Zenoh's settings of a team's router: who may send and hear what, and how much."""
+    return {"access_control": access_control(config), **capacity(config)}
 
-    Args:
-        config: the team's configuration.
-        revoked: by identity the number of the last certificate that is not valid any more.
-    """
+
+def access_control(config: Config) -> dict[str, Any]:
+    """Zenoh's `access_control`: everything denied but what the team's rights permit."""
     team = config.team.name
     common = _common_rules(team)
-    rules = [*common, _rule(_OTHERS, ["put"], _OUT, [f"{team}/{PROBE}/nothing"])]
-    # Who has no subject is denied everything too, but Zenoh does not log whom it denies what.
-    subjects: list[dict[str, Any]] = [
-        {"id": _OTHERS, "cert_common_names": list(_names_without_rights(config, revoked))}
-    ]
-    policies = [{"rules": [_OTHERS], "subjects": [_OTHERS]}]
+    rules, subjects, policies = [*common], list[dict[str, Any]](), list[dict[str, Any]]()
     for rights in team_rights(config):
-        name = rights.identity.name
-        own = _own_rules(rights, team)
+        name, own = rights.identity.name, _own_rules(rights, team)
         rules += own
-        names = valid_names(name, revoked.get(name, 0))
-        subjects.append({"id": name, "cert_common_names": names})
+        subjects.append({"id": name, "cert_common_names": [name]})
         policies.append({"rules": [rule["id"] for rule in (*common, *own)], "subjects": [name]})
     return {
         "enabled": True,  # without it the whole block is silently nothing
@@ -99,22 +130,41 @@ def access_control(config: Config, revoked: Mapping[str, int]) -> dict[str, Any]
     }
 
 
-def _names_without_rights(config: Config, revoked: Mapping[str, int]) -> Iterator[str]:
-    """Common names of revoked certificates, and of those of a larger team of the same authority."""
-    roll = {who.name for who in team_roll(config)}
-    for name, last in revoked.items():
-        yield from (common_name(name, k) for k in range(1, last + 1))
-    robots = robot_names(_MOST_ROBOTS)
-    for name in (SIM, *robots, *map(plant_name, robots)):
-        if name not in roll:
-            yield from valid_names(name, 0)
+def capacity(config: Config) -> dict[str, Any]:
+    """Zenoh's settings of a router that let nobody take more than its share."""
+    team = config.team.name
+    sizes = [_size(t.name, ["put"], t.key(team, "*"), largest(t.type)) for t in TABLE]
+    sizes.append(_size("receipts", ["query", "reply"], f"{team}/*/{RECEIVED}", _ANSWER))
+    sizes += [
+        _size(q.name, ["query", "reply"], q.key(team, "*"), largest(q.type)) for q in QUESTIONS
+    ]
+    return {
+        "low_pass_filter": sizes,
+        "transport/unicast/max_sessions": len(team_identities(config)) + _SPARE_SESSIONS,
+        "transport/unicast/max_links": 1,  # the rules do not see a second link of a session
+        "transport/link/rx/max_message_size": MAX_BYTES,
+    }
+
+
+def largest(kind: type[Message]) -> int:
+    """Bytes that a message of a type takes at most."""
+    sizes = {bool: 1, int: _NUMBER, float: _NUMBER, str: _TEXT, list: _LISTED, dict: _LISTED}
+    total = _FRAME
+    for item in fields(kind):
+        meta = item.metadata
+        size = _array(meta["shape"]) if "shape" in meta else sizes[meta["kind"]]
+        total += len(item.name) + _FRAME + size
+    return min(total, MAX_BYTES)
+
+
+def questions_of(team: str) -> list[str]:
+    """What anybody may ask a process: whether all has arrived, and who it is."""
+    return [f"{team}/*/{RECEIVED}", *(question.key(team, "*") for question in QUESTIONS)]
 
 
 def _published(who: Identity, team: str, robots: Sequence[str]) -> tuple[str, ...]:
     if who.role in _HEARERS:
         return ()
-    if who.role == PROBE:
-        return tuple(f"{team}/{PROBE}/{name}" for name in _PROBED)
     return tuple(
         topic.key(team, name)
         for topic in TABLE
@@ -156,11 +206,6 @@ def _common_rules(team: str) -> list[dict[str, Any]]:
     ]
 
 
-def questions_of(team: str) -> list[str]:
-    """What anybody may ask a process: whether all has arrived, and who it is."""
-    return [f"{team}/*/{RECEIVED}", *(question.key(team, "*") for question in QUESTIONS)]
-
-
 def _own_rules(rights: Rights, team: str) -> list[dict[str, Any]]:
     name = rights.identity.name
     rules = [_rule(f"{name}-token", ["liveliness_token"], _IN, [f"{team}/{name}/*/*"])]
@@ -169,8 +214,6 @@ def _own_rules(rights: Rights, team: str) -> list[dict[str, Any]]:
     if rights.hears:
         rules.append(_rule(f"{name}-subscribes", ["declare_subscriber"], _IN, rights.hears))
         rules.append(_rule(f"{name}-hears", ["put"], _OUT, rights.hears))
-    if rights.identity.role == PROBE:
-        rules.append(_rule(f"{name}-deaf", ["declare_subscriber"], _IN, [f"{team}/{PROBE}/{DEAF}"]))
     return rules
 
 
@@ -185,3 +228,14 @@ def _rule(
         "permission": "allow",
         "key_exprs": list(keys),
     }
+
+
+def _size(name: str, messages: list[str], key: str, limit: int) -> dict[str, Any]:
+    """Rule of the greatest size of messages that come in, bytes."""
+    rule = {"id": name, "messages": messages, "flows": _IN, "key_exprs": [key]}
+    return {**rule, "size_limit": limit}
+
+
+def _array(shape: Iterable[int | str]) -> int:
+    """Bytes of float64 of a shape; of a length that nobody knows as many as a message may have."""
+    return 8 * prod(d if isinstance(d, int) else _LENGTHS.get(d, MAX_BYTES) for d in shape)

@@ -13,10 +13,7 @@ from typing import Final
 from quadriga.shared.config.endpoints import host_and_port
 from quadriga.shared.errors import ConfigError, system_reason
 from quadriga.shared.runtime.clock import utc_now
-from quadriga.shared.security.certificate import EXPIRED as EXPIRED
-from quadriga.shared.security.certificate import NOT_YET_VALID as NOT_YET_VALID
-from quadriga.shared.security.certificate import read_certificate
-from quadriga.shared.security.tls import TlsFiles
+from quadriga.shared.security.certificates import EXPIRED, NOT_YET_VALID, TlsFiles, read_certificate
 
 TRUSTED: Final = "trusted"
 UNREACHABLE: Final = "unreachable"  # nobody answers there

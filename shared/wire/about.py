@@ -67,19 +67,8 @@ class About(Message):
     )
 
 
-@record
-class Refusals(Message):
-    """What a router that has rules has refused so far, of each sender the newest kinds."""
-
-    entries: tuple[str, ...] = plain(
-        list, "JSON: who, action, key and reason as in a Refusal, how many times, s since the last"
-    )
-
-
-_ASKERS: Final = ("every process before the walk", DOCTOR)
-ABOUT: Final = Question("about", About, _ASKERS)
-REFUSALS: Final = Question("refusals", Refusals, _ASKERS)  # nobody but a router answers it
-QUESTIONS: Final = (ABOUT, REFUSALS)
+ABOUT: Final = Question("about", About, ("every process before the walk", DOCTOR))
+QUESTIONS: Final = (ABOUT,)
 
 
 def stage_of(reached: frozenset[str], *, met: bool) -> str:

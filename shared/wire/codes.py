@@ -109,12 +109,6 @@ EVENTS: Final[Mapping[str, EventCode]] = MappingProxyType(
     }
 )
 DOWN: Final = frozenset((FALL, ROBOT_STOPPED))  # a robot that walks no more: the walk ends
-# How details of events without a code end or begin (schema 1), by kind; the last one fits all.
-_WORDS: Final = {
-    "fault": (("of its torque", WEAK_MOTOR), ("answers again", BACK), ("dropped", MALFORMED),
-              ("gone", GONE), ("", SILENT)),
-    "stop": (("signal", SIGNAL), ("fall of", FALLEN), ("", TIME_OVER)),
-}  # fmt: skip
 
 
 def with_detail(code: str, detail: str) -> str:
@@ -130,9 +124,3 @@ def with_detail(code: str, detail: str) -> str:
 def code_of(text: str) -> str:
     """The code of a plan's status or of a reason to stop; "" of none."""
     return text.partition(":")[0]
-
-
-def code_of_schema_1(kind: str, detail: str) -> str:
-    """The code of an event that was recorded when events had none."""
-    words = _WORDS.get(kind, (("", kind),))
-    return next(code for word, code in words if word in detail)

@@ -29,8 +29,7 @@ _QUESTIONS = """\
 ## Questions
 
 What each process answers when it is asked (a query of Zenoh) on `<team>/<process>/<question>`,
-before the walk and during it; `refusals` only a router with certificates. Nothing of it is
-recorded.
+before the walk and during it. Nothing of it is recorded.
 
 | question | answer | asked by |
 |---|---|---|

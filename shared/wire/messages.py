@@ -7,18 +7,27 @@ Every message carries `tick` (1 ms of world time) and `stamp_ns` (the world's ti
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from functools import partial
 from itertools import accumulate
-from typing import Any, ClassVar, Self, TypeVar, dataclass_transform
+from typing import Any, ClassVar, Final, Self, TypeVar, dataclass_transform
 
 import numpy as np
 
-from quadriga.shared.robot.conventions import OUTPUTS, Array
+from quadriga.shared.printable import printable_line
+from quadriga.shared.robot.conventions import JOINT_NAMES, OUTPUTS, Array, Leg
 from quadriga.shared.runtime.record import record
-from quadriga.shared.wire.codes import EVENTS, code_of_schema_1
-from quadriga.shared.wire.entries import FORCES, JOINTS, LEGS, ONE, WXYZ, XYZ
+from quadriga.shared.wire.codes import EVENTS
+
+# Names of the entries of arrays, for readers that know nothing of this project.
+XYZ: Final = ("x", "y", "z")
+WXYZ: Final = ("w", "x", "y", "z")
+LEGS: Final = tuple(leg.name for leg in Leg)
+JOINTS: Final = tuple(name.removesuffix("_joint") for name in JOINT_NAMES)
+FORCES: Final = tuple(f"{leg}.{axis}" for leg in LEGS for axis in XYZ)
+ONE: Final = ("",)  # a single number, called as its field is
 
 Dim = int | str
 F = TypeVar("F", bound="Flat")
@@ -45,11 +54,6 @@ class Message:
     SCHEMA: ClassVar[int] = 1
     tick: int = plain(int, "world time of the content [ms]")
     stamp_ns: int = plain(int, "world time of the content [ns]")
-
-    @classmethod
-    def upgrade(cls, schema: int, body: dict[str, Any]) -> dict[str, Any] | None:
-        """Fields of a message of an earlier schema as today's has them; None: not readable."""
-        return None
 
 
 class Flat(Message):
@@ -272,10 +276,7 @@ class Clock(Message):
 
 @record
 class Event(Message):
-    """Something happened in the world.
-
-    Of schema 1, which had no `code`, recordings are still read.
-    """
+    """Something happened in the world."""
 
     SCHEMA = 2
     kind: str = plain(str, "push, payload, terrain, bridge, fault, fall, start or stop")
@@ -288,21 +289,18 @@ class Event(Message):
         """The announcement of something that happened at `tick`, by its code."""
         return cls(tick, tick * 1_000_000, EVENTS[code].kind, robot, detail, code)
 
-    @classmethod
-    def upgrade(cls, schema: int, body: dict[str, Any]) -> dict[str, Any] | None:
-        """Fields of an event of schema 1, with its code."""
-        kind, detail = body.get("kind"), body.get("detail")
-        if schema != 1 or not isinstance(kind, str) or not isinstance(detail, str):
-            return None
-        return {**body, "code": code_of_schema_1(kind, detail)}
+
+_LINE: Final = re.compile(r"(\d+) ms: (\S+) (\S*) (.*)")  # of an event in a log
 
 
-@record
-class Refusal(Message):
-    """What a router has not let through, of one sender on one key, since it told so last."""
+def format_event(event: Event) -> str:
+    """The line of an event: its tick, its code, the robot concerned or nothing, and its detail."""
+    return printable_line(f"{event.tick} ms: {event.code} {event.robot} {event.detail}")
 
-    who: str = plain(str, "common name of the sender's certificate, or where it came from")
-    action: str = plain(str, "what was refused, such as put or declare subscriber")
-    key: str = plain(str, "the key concerned, or empty")
-    reason: str = plain(str, "denied, revoked, large, often, expired, untrusted or full")
-    count: int = plain(int, "how many times")
+
+def parse_events(lines: Iterable[str]) -> Iterator[Event]:
+    """The events of a log; lines that are none are left out."""
+    for line in lines:
+        match = _LINE.fullmatch(line.rstrip("\n"))
+        if match is not None and match[2] in EVENTS:
+            yield Event.of(int(match[1]), match[2], match[3], match[4])

@@ -1,13 +1,28 @@
-"""One row of the table of topics."""
+"""One row of the table of topics, and the rows that other packages bring.
+
+Those are entry points of the group `quadriga.topics`.
+"""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass
-from typing import Final
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any, Final
 
+from quadriga.shared.errors import ConfigError
+from quadriga.shared.members import ESTOP, LAUNCHER, ROLES
 from quadriga.shared.wire.messages import Message
 
 CONFIGURED: Final = -1  # a time that the configuration says: see `quadriga.shared.config.timing`
+GROUP: Final = "quadriga.topics"
+_NAME: Final = re.compile(r"[A-Za-z0-9_.-]+(/[A-Za-z0-9_.-]+)*")
+_TAKERS: Final = frozenset({LAUNCHER, ESTOP, *(role.name for role in ROLES)})
+_ALONE: Final = (
+    "the row stands in a module that imports no more of this project than "
+    "quadriga.shared.wire.topic and .messages"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,3 +56,57 @@ class Topic:
     def key(self, team: str, robot: str = "") -> str:
         """The Zenoh key of this topic; `robot` may be `*`."""
         return f"{team}/{robot}/{self.name}" if self.per_robot else f"{team}/{self.name}"
+
+
+def plugin_topics(own: Sequence[Topic]) -> tuple[Topic, ...]:
+    """The rows of all installed packages, by the names of their entry points.
+
+    They are recorded, listed, exported and documented like the project's own; but no process of
+    the project acts on their messages.
+
+    Args:
+        own: the project's rows.
+
+    Raises:
+        ConfigError: an entry point cannot be imported or is no row, or its row is like another.
+    """
+    rows = list(own)
+    for entry in sorted(entry_points(group=GROUP), key=lambda entry: (entry.name, entry.value)):
+        row = _load(entry)
+        wrong = _objection(row, rows)
+        if wrong:
+            raise ConfigError(_origin(entry), *wrong)
+        rows.append(row)
+    return tuple(rows[len(own) :])
+
+
+def _load(entry: EntryPoint) -> Any:
+    try:
+        return entry.load()
+    except Exception as error:
+        got = f"{type(error).__name__}: {error}"
+        raise ConfigError(_origin(entry), got, "a row that can be imported", _ALONE) from error
+
+
+def _objection(row: Any, rows: Sequence[Topic]) -> tuple[str, str, str] | None:
+    """What is wrong with a row beside those before it: got, expected, cause; None: nothing."""
+    if not isinstance(row, Topic):
+        return repr(row)[:80], "a Topic of quadriga.shared.wire.topic", ""
+    if not (isinstance(row.type, type) and issubclass(row.type, Message)):
+        return repr(row.type)[:80], "a Message of quadriga.shared.wire.messages", ""
+    if not _NAME.fullmatch(row.name) or row.name in {other.name for other in rows}:
+        return repr(row.name), "a name of its own, such as 'wind' or 'weather/wind'", ""
+    if row.type.__name__ in {other.type.__name__ for other in rows}:
+        return row.type.__name__, "a message type with a name of its own", "schemas have it"
+    if row.period_ms < 0 or row.max_age_ms < 0:
+        got = f"period_ms {row.period_ms}, max_age_ms {row.max_age_ms}"
+        return got, "at least 0", "the configuration knows no times of other packages' topics"
+    taken = sorted(_TAKERS & {*row.receivers})
+    if taken:
+        return ", ".join(taken), "receivers of its own", "these take only what they know"
+    return None
+
+
+def _origin(entry: EntryPoint) -> str:
+    dist = f" of {entry.dist.name} {entry.dist.version}" if entry.dist else ""
+    return f"entry point {entry.name} = {entry.value} in {GROUP}{dist}"

@@ -10,11 +10,11 @@ from typing import Final
 
 from quadriga.shared import members
 from quadriga.shared.errors import MessageError
-from quadriga.shared.members import AGENT, LAUNCHER, OPERATOR, PLANNER, ROUTER, SIM
+from quadriga.shared.members import AGENT, LAUNCHER, OPERATOR, PLANNER, SIM
 from quadriga.shared.wire import messages as msg
-from quadriga.shared.wire.plugin_topics import plugin_topics
 from quadriga.shared.wire.topic import CONFIGURED as CONFIGURED
 from quadriga.shared.wire.topic import Topic as Topic
+from quadriga.shared.wire.topic import plugin_topics
 
 SAMPLE_MS: Final = 10  # one sample of u and y: forces are means over it, outputs taken at its end
 REFERENCE_EPOCH_MS: Final = 100  # the operator speaks at multiples of this
@@ -91,12 +91,9 @@ POSTURE: Final = Topic(
     "posture", msg.State, (SIM,), (), per_robot=True, period_ms=SAMPLE_MS, recorded=False
 )
 
-# What a router has refused, if it has rules; the tick is the last of the clock that it heard.
-REFUSED: Final = Topic("refused", msg.Refusal, (ROUTER,), (), period_ms=0, repeats=True)
-
 _OWN: Final = (
     STATE, COMMAND, MEASUREMENT, PLAN, STATUS, INPUTS, REFERENCE, *WORDS, LIVE_FAULT, TRUTH,
-    EVENT, AGENT_EVENT, INJECTED, CLOCK, POSTURE, REFUSED,
+    EVENT, AGENT_EVENT, INJECTED, CLOCK, POSTURE,
 )  # fmt: skip
 TABLE: Final = (*_OWN, *plugin_topics(_OWN))
 _BY_NAME: Final = {topic.name: topic for topic in TABLE}

@@ -17,7 +17,7 @@ from quadriga.shared.config.endpoints import host_and_port, is_tls
 from quadriga.shared.config.load import load
 from quadriga.shared.members import DOCTOR, ESTOP, LAST, OBSERVER, RESET, RESUME, ROUTER, STOP
 from quadriga.shared.robot.conventions import robot_names
-from quadriga.shared.security.roll import team_roll
+from quadriga.shared.security.access import team_identities
 from quadriga.team.launch import ProcessSpec, process_table
 
 TOP = Path(__file__).parents[2]
@@ -163,7 +163,7 @@ def test_certificates_are_made_for_all_and_only_their_maker_has_the_authority() 
     assert secrets_of("certs") == {
         name for other in (*ON_THE_BUS, VIEW) for name in secrets_of(other)
     }
-    assert secrets_of("certs") <= {who.name for who in team_roll(CONFIG)}
+    assert secrets_of("certs") <= {who.name for who in team_identities(CONFIG)}
     held = [name for name in SERVICES if "secret-authority" in mounts_of(name).values()]
     assert held == ["certs"]
 

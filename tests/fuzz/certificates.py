@@ -18,11 +18,13 @@ from cryptography.x509.oid import NameOID
 from quadriga.certs.authority import Authority, Pair, Subject
 from quadriga.certs.folder import CertificateFolder
 from quadriga.shared.members import ROUTER
-from quadriga.shared.security.certificate import is_signed, read_certificate
-from quadriga.shared.security.roll import format_numbers
-from quadriga.shared.security.tls import AUTHORITY, CERTIFICATE
+from quadriga.shared.security.certificates import (
+    AUTHORITY,
+    CERTIFICATE,
+    is_signed,
+    read_certificate,
+)
 from tests.fuzz.damage import damage
-from tests.fuzz.target import FileReader, change_json
 
 _NOW: Final = datetime(2026, 1, 1, tzinfo=UTC)
 _NAMES: Final = ("r1." + "9" * 5000, "", "r1.1", "r1.\u0663", "\x1b[2J", "x" * 3000, ".", "r1.-1")
@@ -33,7 +35,7 @@ class Certificates:
 
     def __init__(self, folder: Path) -> None:
         authority = Authority.create("team", _NOW)
-        pair = authority.issue(Subject("router.1", ("localhost", "127.0.0.1")), _NOW, 30.0)
+        pair = authority.issue(Subject("router", ("localhost", "127.0.0.1")), _NOW, 30.0)
         self._folder = CertificateFolder(folder / "certificates", (ROUTER, "r1"))
         self._path = folder / "certificates" / ROUTER / CERTIFICATE
         self._path.parent.mkdir(parents=True)
@@ -78,19 +80,6 @@ class Authorities:
     def read(self, content: bytes) -> None:
         certificate, _, key = content.partition(b"\0\0")
         Authority(Pair(certificate, key))
-
-
-def revocations(folder: Path) -> FileReader:
-    """The numbers of certificates that a router reads."""
-    numbers = {"r1": 3, "launcher": 1, "observer": 12}
-    certificates = CertificateFolder(folder / "numbers", ("r1", "launcher"))
-    certificates.revoked_file.parent.mkdir(parents=True)
-
-    def read(path: Path) -> None:
-        certificates.standings()
-
-    good = format_numbers(numbers).encode()
-    return FileReader(certificates.revoked_file, [good], read, change_json)
 
 
 def _forge(name: str, key: ec.EllipticCurvePrivateKey) -> bytes:

@@ -20,20 +20,22 @@ from quadriga.drive.gamepad import EVENT_BYTES, Gamepad, take, wish_of
 from quadriga.drive.wish import standing
 from quadriga.plant.commands import CommandBox
 from quadriga.recordings.echo import format_entry
-from quadriga.shared.bus.absence import MemberAnswer, TeamView, describe_absent, diagnose
-from quadriga.shared.bus.agreement import TeamNorm
-from quadriga.shared.bus.inquiry import read_about
-from quadriga.shared.bus.introduction import describe_process
+from quadriga.shared.bus.diagnostics import (
+    MemberAnswer,
+    TeamNorm,
+    TeamView,
+    describe_absent,
+    diagnose,
+)
+from quadriga.shared.bus.discovery import read_about
+from quadriga.shared.bus.process_info import describe_process
 from quadriga.shared.config.load import load
 from quadriga.shared.errors import MessageError
 from quadriga.shared.members import SIM, team_members
 from quadriga.shared.printable import printable_line
-from quadriga.shared.recording.mcap_chunk import ChunkEntry
-from quadriga.shared.security.past_refusals import RefusalMemory, read_entries, refusals_of
-from quadriga.shared.security.refusals import REASONS, Refused
-from quadriga.shared.wire.about import QUESTIONS, Refusals
-from quadriga.shared.wire.codec import decode, encode
-from quadriga.shared.wire.envelope import envelope
+from quadriga.shared.recording.reader import ChunkEntry
+from quadriga.shared.wire.about import QUESTIONS, About
+from quadriga.shared.wire.codec import decode, encode, envelope
 from quadriga.shared.wire.messages import LiveFault
 from quadriga.shared.wire.topics import TABLE
 from quadriga.sim_server.world.faults import KINDS as FAULT_KINDS
@@ -83,42 +85,27 @@ class Messages:
 
 
 class Answers:
-    """What processes say of themselves when they are asked, and a router of what it has refused."""
+    """What processes say of themselves when they are asked."""
 
     def __init__(self) -> None:
         config = load(None, {"team.robots": 2})
-        memory = RefusalMemory()
-        for reason in REASONS:
-            memory.note(Refused("r1.1", "put", "team/r1/command", reason), 3, 1.0)
-        self._about, self._entries = describe_process(config, "r1"), memory.entries(2.0)
         others = [encode(example(question.type)) for question in QUESTIONS]
-        refusals = encode(Refusals(0, 0, self._entries))
-        self._good = (*others, encode(self._about), refusals)
+        self._good = (*others, encode(describe_process(config, "r1")))
         self._members = team_members(("r1", "r2"), central=False, recorded=False, plant_each=False)
         self._norm = TeamNorm(describe_process(config, SIM), "abc", "r1")
 
     def make(self, random: np.random.Generator) -> bytes:
-        if random.random() < 0.5:
-            return damage(choose(self._good, random), random)
-        entries = [change_json(entry.encode(), random) for entry in self._entries]
-        return encode(Refusals(0, 0, tuple(each.decode("utf-8", "replace") for each in entries)))
+        return damage(choose(self._good, random), random)
 
     def read(self, content: bytes) -> None:
-        about = read_about("r1", content)
-        past = None
-        try:
-            past = read_entries(decode(content, Refusals).entries)
-            refusals_of("r1", past)
-        except MessageError as error:
-            if about is None:
-                raise error
-        told = {"r1": [MemberAnswer(about, 0, 1)]}
+        told = {"r1": [MemberAnswer(read_about("r1", content), 0, 1)]}
         names = frozenset(("r1", "r2", SIM))
-        view = TeamView(True, names, frozenset(), names, told, self._norm, past)
+        view = TeamView(True, names, frozenset(), names, told, self._norm)
         for member in self._members:
             for found in diagnose(member, view):
                 assert found.text == printable_line(found.text)
         describe_absent(self._members, view)
+        decode(content, About)
 
 
 class Orders:

@@ -16,11 +16,10 @@ from quadriga.recordings.survey import survey
 from quadriga.shared.config.load import load
 from quadriga.shared.errors import QuadrigaError
 from quadriga.shared.printable import printable_line
-from quadriga.shared.recording.mcap_file import McapFile
+from quadriga.shared.recording.metadata import PROFILE, seal
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.recording.salvage import Salvage
-from quadriga.shared.recording.seal import seal
-from quadriga.shared.recording.writer import PROFILE, RecordingWriter
+from quadriga.shared.recording.recover import DamagedRecording
+from quadriga.shared.recording.writer import McapFile, RecordingWriter
 from quadriga.shared.wire.codec import encode
 from quadriga.shared.wire.topics import TABLE
 from tests.fuzz.arrays import SMALL
@@ -71,7 +70,7 @@ class Recordings:
             list(recording.entries())
             recording.require_whole()
         with suppress(QuadrigaError):
-            list(Salvage(self._path).entries())
+            list(DamagedRecording(self._path).entries())
         with suppress(QuadrigaError):
             format_findings(check(self._path))
         self._recover()

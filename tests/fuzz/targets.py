@@ -37,7 +37,6 @@ KINDS: Final[Mapping[str, Callable[[Path], Target]]] = {
     "saved-programs": arrays.saved_programs,
     "certificates": certificates.Certificates,
     "authorities": lambda _: certificates.Authorities(),
-    "revocations": certificates.revocations,
     "recordings": recordings.Recordings,
     "traces": walks.traces,
     "exports": walks.exports,

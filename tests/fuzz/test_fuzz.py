@@ -69,11 +69,11 @@ def test_the_command_writes_its_figures_and_fails_beyond_a_limit(
     limit: str, status: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = tmp_path / "figures.json"
-    words = ["--only", "revocations", "--inputs", "5", "--limit-ms", limit, "--json", str(file)]
+    words = ["--only", "authorities", "--inputs", "5", "--limit-ms", limit, "--json", str(file)]
     assert main(words) == status
     said = capsys.readouterr().err
     assert ("processor time, at most 0 are allowed" in said) == bool(status)
     figures = json.loads(file.read_text(encoding="utf-8"))
     assert figures["seed"] == 0
-    assert figures["kinds"]["revocations"]["inputs"] == 5
-    assert bool(figures["kinds"]["revocations"]["complaints"]) == bool(status)
+    assert figures["kinds"]["authorities"]["inputs"] == 5
+    assert bool(figures["kinds"]["authorities"]["complaints"]) == bool(status)

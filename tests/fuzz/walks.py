@@ -39,10 +39,9 @@ from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import QuadrigaError
 from quadriga.shared.recording.config import recorded_config
-from quadriga.shared.recording.mcap_file import McapFile
+from quadriga.shared.recording.metadata import PROFILE, seal
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.recording.seal import seal
-from quadriga.shared.recording.writer import PROFILE
+from quadriga.shared.recording.writer import McapFile
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.wire.codec import MAX_INTEGER, MAX_TICK, encode
 from quadriga.shared.wire.messages import Message

@@ -29,8 +29,8 @@ from quadriga.recordings.metadata import build_metadata
 from quadriga.shared.config.load import load as load_config
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError, QuadrigaError, RecordingError
+from quadriga.shared.recording.metadata import PROFILE
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.recording.writer import PROFILE
 from quadriga.shared.robot.conventions import Array, robot_names
 from quadriga.shared.runtime.arithmetic import arithmetic
 from quadriga.shared.runtime.atomic import atomic_write

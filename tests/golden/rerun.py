@@ -9,7 +9,7 @@ from quadriga.agents.agent import Agent
 from quadriga.agents.inbox.inbox import Inbox
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config
-from quadriga.shared.recording.mcap_chunk import ChunkEntry
+from quadriga.shared.recording.reader import ChunkEntry
 from quadriga.shared.runtime.blas import use_one_blas_thread
 from quadriga.shared.wire.codec import encode
 from quadriga.shared.wire.topics import COMMAND, MEASUREMENT, PLAN

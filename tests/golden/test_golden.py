@@ -16,8 +16,7 @@ import pytest
 
 from quadriga.agents.planner.acceptance import load_checked
 from quadriga.shared.config.sections import Config
-from quadriga.shared.recording.mcap_chunk import ChunkEntry
-from quadriga.shared.recording.reader import Recording
+from quadriga.shared.recording.reader import ChunkEntry, Recording
 from quadriga.shared.runtime.arithmetic import arithmetic, differences
 from quadriga.shared.wire.codec import decode, encode
 from quadriga.shared.wire.messages import Command, Message, State

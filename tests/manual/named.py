@@ -127,7 +127,7 @@ def _check_sim(arguments: argparse.Namespace, config: Config) -> None:
 
 
 def _check_certs(arguments: argparse.Namespace, _config: Config) -> None:
-    if arguments.action != "renew" and bool(arguments.names) != (arguments.action == "revoke"):
+    if arguments.action != "renew" and arguments.names:
         raise ConfigError("NAME", " ".join(arguments.names), f"those that {arguments.action} takes")
 
 

@@ -11,7 +11,7 @@ from quadriga.plant.late import MOTOR_DAMPING
 from quadriga.plant.server import STOP_LINGER_MS, PlantServer
 from quadriga.plant.team_time import FollowerTime
 from quadriga.plant.words import NO_WORDS, Words
-from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.bus.session import Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.wire import codes
 from quadriga.shared.wire.messages import Reset, SafeStop

@@ -14,10 +14,11 @@ import pytest
 
 from quadriga.plant import pace as module
 from quadriga.plant.pace import SystemClock, TeamPace
-from quadriga.shared.bus.absence import ClockOffset, MemberAnswer
-from quadriga.shared.bus.barrier import meet, members
-from quadriga.shared.bus.introduction import Introduction
-from quadriga.shared.bus.zenoh_bus import READY, Bus
+from quadriga.shared.bus.diagnostics import ClockOffset, MemberAnswer
+from quadriga.shared.bus.discovery import join
+from quadriga.shared.bus.membership import members
+from quadriga.shared.bus.process_info import ProcessInfo
+from quadriga.shared.bus.session import READY, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError
@@ -81,9 +82,9 @@ def paces(config: Config) -> Iterator[dict[str, TeamPace]]:
     with ExitStack() as stack:
         names = sorted(members(config), key=lambda name: name != "plant_r1")
         buses = {n: stack.enter_context(Bus.open(config.bus, "team", n)) for n in names}
-        said = {name: Introduction(bus, config) for name, bus in buses.items()}
+        said = {name: ProcessInfo(bus, config) for name, bus in buses.items()}
         threads = [
-            Thread(target=meet, args=(bus, config, never, said[name]))
+            Thread(target=join, args=(bus, config, never, said[name]))
             for name, bus in buses.items()
         ]
         for thread in threads:
@@ -135,7 +136,7 @@ def test_both_begin_at_one_instant_and_keep_the_pace_of_the_system_clock(
 def of_plant(config: Config, name: str) -> TeamPace:
     """One that has met nobody."""
     bus = SimpleNamespace(name=name, team="team")
-    return TeamPace(cast("Bus", bus), config, cast("Introduction", None))
+    return TeamPace(cast("Bus", bus), config, cast("ProcessInfo", None))
 
 
 def test_a_late_plant_catches_up_and_leaves_no_tick_out(

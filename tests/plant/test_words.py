@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from quadriga.plant.words import NO_WORDS, Words, listen_to_words
-from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.members import SIM
 from quadriga.shared.runtime.clock import monotonic, sleep

@@ -14,7 +14,7 @@ from rich.console import Console
 from benchmarks.slow_motion import in_slow_motion
 from quadriga.replay.outcome import format_outcome
 from quadriga.replay.team_replay import replay
-from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.bus.session import Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml

@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from quadriga.shared.bus.zenoh_bus import HERE, POLL, READY, Bus
+from quadriga.shared.bus.session import HERE, POLL, READY, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.robot.conventions import Array
 from quadriga.shared.runtime.clock import sleep

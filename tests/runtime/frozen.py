@@ -9,7 +9,7 @@ from typing import Final
 
 import pytest
 
-from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.bus.session import Bus
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.codes import SILENT

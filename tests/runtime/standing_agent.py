@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from quadriga.shared.bus.barrier import meet
-from quadriga.shared.bus.zenoh_bus import HERE, POLL, READY, Bus
+from quadriga.shared.bus.discovery import join
+from quadriga.shared.bus.session import HERE, POLL, READY, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
@@ -34,7 +34,7 @@ def run(config: Config, robot: str) -> None:
         bus.subscribe(STATE.key(team, robot))
         bus.subscribe(EVENT.key(team))
         put = bus.publisher(COMMAND.key(team, robot))
-        meet(bus, config, stopped)
+        join(bus, config, stopped)
         if config.world.mode == "realtime":  # or it lies down on a busy machine
             take_priority(config.runtime.priority)
         bus.declare(READY)

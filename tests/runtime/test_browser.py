@@ -10,7 +10,7 @@ import pytest
 from quadriga.drive.driver_words import WHERE
 from quadriga.drive.find import open_link
 from quadriga.recordings.traces import read_traces
-from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.bus.session import Bus
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.wire.codec import decode
 from quadriga.shared.wire.codes import FALL

@@ -14,8 +14,8 @@ from typing import Any
 
 import pytest
 
-from quadriga.shared.bus.introduction import Introduction, describe_process
-from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.bus.process_info import ProcessInfo, describe_process
+from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
@@ -29,12 +29,12 @@ from tests.runtime.conftest import BEGUN, WAIT, Make, Team
 
 WAITS = """
 import sys
-from quadriga.shared.bus.barrier import meet
-from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.bus.discovery import join
+from quadriga.shared.bus.session import Bus
 from quadriga.shared.config.load import parse_assignment, load
 config = load(None, dict(map(parse_assignment, sys.argv[1:])))
 with Bus.open(config.bus, "team", "r2") as bus:
-    meet(bus, config, lambda: False)
+    join(bus, config, lambda: False)
 """
 
 
@@ -82,9 +82,9 @@ def buses(config: Config) -> Iterator[dict[str, Bus]]:
 def test_each_process_is_told_with_what_is_wrong_with_it(
     config: Config, buses: dict[str, Bus]
 ) -> None:
-    Introduction(buses["sim"], config)
+    ProcessInfo(buses["sim"], config)
     other = replace(config, world=replace(config.world, seed=4))
-    Introduction(buses["r1"], other, "ab" * 32)
+    ProcessInfo(buses["r1"], other, "ab" * 32)
     newer = encode(replace(describe_process(config, "operator"), version="9", stage="here"))
     assert decode(newer, About).wall_ns == 0, "it lives in 1970"
     buses["operator"].answer(ABOUT.key("team", "operator"), lambda: newer)

@@ -14,9 +14,9 @@ from quadriga.commands.parser import main
 from quadriga.recordings.check import check
 from quadriga.recordings.summary import summary_of
 from quadriga.recordings.traces import read_traces
-from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.bus.session import Bus
 from quadriga.shared.errors import ProcessError
-from quadriga.shared.recording.writer import END
+from quadriga.shared.recording.metadata import END
 from quadriga.shared.wire.codes import LEAD_GONE, LINK_LOST
 from quadriga.shared.wire.topics import TRUTH
 from quadriga.team.launch import Launch

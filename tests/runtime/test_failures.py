@@ -11,7 +11,7 @@ from dataclasses import replace
 import pytest
 
 from quadriga.recordings.summary import summarise
-from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.bus.session import Bus
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.runtime.clock import monotonic, sleep

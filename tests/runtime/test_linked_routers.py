@@ -12,8 +12,8 @@ from dataclasses import replace
 import pytest
 
 from quadriga.commands.parser import build_parser
-from quadriga.shared.bus.zenoh_bus import READY, Bus
-from quadriga.shared.bus.zenoh_settings import link_settings
+from quadriga.shared.bus.session import READY, Bus
+from quadriga.shared.bus.settings import link_settings
 from quadriga.shared.config.sections import BusConfig, Config
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.runtime.clock import monotonic

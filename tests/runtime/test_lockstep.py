@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from quadriga.shared.bus.zenoh_bus import READY, Bus
+from quadriga.shared.bus.session import READY, Bus
 from quadriga.shared.errors import MessageError
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.robot.conventions import robot_names

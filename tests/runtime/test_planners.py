@@ -18,8 +18,8 @@ from quadriga.agents.time_grid import first_step, step_ms
 from quadriga.identification.central_planner import build_central_planner
 from quadriga.identification.predictors import ensure_predictor
 from quadriga.identification.rollout import Rollout
-from quadriga.shared.bus.lead_watch import LAST_WORDS
-from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.bus.liveness import LAST_PACKETS
+from quadriga.shared.bus.session import Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
@@ -142,7 +142,7 @@ def test_a_central_planner_outlives_a_false_end_and_a_pause_after_it(tmp_path: P
         bus.publisher(EVENT.key(config.team.name))(encode(false))
         await_tick(bus, now + AHEAD_MS + 200)
         os.kill(running.pids["sim"], signal.SIGSTOP)
-        sleep(LAST_WORDS + 0.5)
+        sleep(LAST_PACKETS + 0.5)
         os.kill(running.pids["sim"], signal.SIGCONT)
         running.watch(lambda: False)
     steps = [plan.step for plan in Recording(tmp_path / "run.mcap").messages(Plan, "r1")]

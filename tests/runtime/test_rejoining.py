@@ -14,7 +14,7 @@ from quadriga.agents.modes import LOSSES, STAND, WALK
 from quadriga.commands.parser import main
 from quadriga.recordings.check import check
 from quadriga.recordings.traces import read_traces
-from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.bus.session import Bus
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.wire.codec import decode

@@ -25,7 +25,7 @@ from quadriga.replay.outcome import ReplayOutcome
 from quadriga.replay.recorded_predictor import copy_predictor
 from quadriga.replay.saved_qp import load as load_qp
 from quadriga.replay.team_replay import replay
-from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.bus.session import Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.errors import ConfigError, RecordingError

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import pytest
 
 from quadriga.commands.parser import main
-from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.bus.session import Bus
 from tests.runtime.conftest import BEGUN, Make
 from tests.runtime.frozen import PATIENCE, freeze
 

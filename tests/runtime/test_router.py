@@ -11,7 +11,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.bus.session import Bus
 from quadriga.shared.runtime.clock import monotonic, sleep
 from tests.runtime.conftest import WAIT, Make, Team, run_alone
 from tests.runtime.test_lockstep import payloads

@@ -8,7 +8,7 @@ import pytest
 
 from quadriga.commands.parser import main
 from quadriga.recordings.traces import read_traces
-from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.bus.session import Bus
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.wire.codes import (

@@ -10,13 +10,10 @@ import pytest
 
 from quadriga.commands.parser import main
 from quadriga.doctor import watch_team
-from quadriga.shared.bus.introduction import Introduction
-from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
+from quadriga.shared.bus.process_info import ProcessInfo
+from quadriga.shared.bus.session import HERE, READY, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.runtime.clock import monotonic, sleep
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.messages import Refusal
-from quadriga.shared.wire.topics import REFUSED
 from quadriga.team.endpoint import free_endpoint
 from tests.runtime.conftest import WAIT
 
@@ -49,24 +46,19 @@ def test_files_say_who_is_healthy_until_the_walk_is_over(
         target=watch_team.watch_team, args=(CONFIG, tmp_path, stop.is_set), daemon=True
     )
     with ExitStack() as stack:
-        router = stack.enter_context(Bus.route(CONFIG.bus.endpoint, "team"))
+        stack.enter_context(Bus.route(CONFIG.bus.endpoint, "team"))
         doctor.start()
         stack.callback(stop.set)
         await_line(tmp_path / "router", "well")
         buses = {n: stack.enter_context(Bus.open(CONFIG.bus, "team", n)) for n in NAMES}
         for bus in buses.values():
-            Introduction(bus, CONFIG)
+            ProcessInfo(bus, CONFIG)
             bus.declare(HERE)
         await_line(tmp_path / "r1", "not well: here, waits for the others")
         for bus in buses.values():
             bus.declare(READY)
         for name in (*NAMES, "doctor"):
             await_line(tmp_path / name, "well")
-        tell = router.publisher(REFUSED.key("team"))
-        tell(encode(Refusal(0, 0, "r1.1", "put", "team/r1/command", "often", 3)))
-        tell(encode(Refusal(0, 0, "r2.1", "put", "team/r1/command", "denied", 3)))
-        await_line(tmp_path / "r2", "not well: the router denies it: put team/r1/command")
-        assert (tmp_path / "r1").read_text(encoding="utf-8") == "well\n"
         buses["operator"].close()
         await_line(tmp_path / "r1", "not well: does not hear operator")
         buses["sim"].close()  # who drives time

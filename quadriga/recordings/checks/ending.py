@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from quadriga.recordings.checks.finding import CheckedMessage, Finding
-from quadriga.shared.recording.writer import END
+from quadriga.shared.recording.metadata import END
 from quadriga.shared.wire.messages import Event
 
 

@@ -9,10 +9,10 @@ from quadriga.recordings.checks.getting_up import Doubts, GettingUp
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import max_ages, periods
 from quadriga.shared.members import AGENT, PLANNER
-from quadriga.shared.recording.sequence import TickTrack
+from quadriga.shared.recording.ticks import TickTrack
 from quadriga.shared.robot.conventions import robot_names
 from quadriga.shared.wire.messages import Event, Plan, Status
-from quadriga.shared.wire.topics import COMMAND, MEASUREMENT, REFUSED, STATE, TABLE, WORDS
+from quadriga.shared.wire.topics import COMMAND, MEASUREMENT, STATE, TABLE, WORDS
 
 _MAY_REPEAT: Final = frozenset(topic.name for topic in TABLE if topic.repeats)
 # What is never passed over, not even in real time: agents and planners skip steps, others do not.
@@ -20,7 +20,7 @@ _WHOLE: Final = frozenset(t.name for t in TABLE if not {AGENT, PLANNER} & {*t.se
 _EVERYONE_S: Final = (STATE, COMMAND, MEASUREMENT)
 _CONTROLLER_S: Final = (STATE, COMMAND)  # of a controller of one's own
 # Sent by who only hears of the time, if somebody walks at all.
-_UNTIMED: Final = (REFUSED.name, *(word.name for word in WORDS))
+_UNTIMED: Final = tuple(word.name for word in WORDS)
 _TAIL_MS: Final = 20  # a world that was stopped may end in the middle of a sample
 
 

@@ -1,11 +1,10 @@
-"""A team's certificates: given once, counted, renewed, revoked, and private."""
+"""A team's certificates: given once, renewed, and private."""
 
 from __future__ import annotations
 
 import base64
 import re
 import stat
-from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from shutil import copy, copytree
@@ -15,12 +14,10 @@ import pytest
 from quadriga.certs.authority import Authority, Pair
 from quadriga.certs.folder import CertificateFolder
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.security.certificate import read_certificate
-from quadriga.shared.security.roll import MOST_VALID, read_numbers
-from quadriga.shared.security.tls import tls_files
+from quadriga.shared.security.certificates import read_certificate, tls_files
 
 NOW = datetime(2026, 3, 1, 12, tzinfo=UTC)
-ROLL = ("r1", "r2", "operator", "probe", "router")
+ROLL = ("r1", "r2", "operator", "router")
 
 
 @pytest.fixture
@@ -30,24 +27,15 @@ def folder(tmp_path: Path) -> CertificateFolder:
     return made
 
 
-def names(folder: CertificateFolder) -> dict[str, str]:
-    return {each.identity: each.certificate.name for each in folder.standings()}
-
-
 def states(folder: CertificateFolder) -> dict[str, str]:
     return {each.identity: each.state(NOW) for each in folder.standings()}
 
 
-def revoked(folder: CertificateFolder) -> dict[str, int]:
-    return read_numbers(folder.revoked_file.read_text(encoding="utf-8"), "revoked")
-
-
 def test_everybody_gets_what_its_process_needs(folder: CertificateFolder) -> None:
-    assert names(folder) == {name: f"{name}.1" for name in ROLL}
+    assert states(folder) == dict.fromkeys(ROLL, "valid")
     for name in ROLL:
         files = tls_files(str(folder.path), name)
         assert files.authority.read_bytes() == (folder.path / "authority.pem").read_bytes()
-    assert tls_files(str(folder.path), "probe").key.parent.parent.name == "router"
 
 
 def test_nobody_but_the_owner_reads_a_key(folder: CertificateFolder) -> None:
@@ -88,7 +76,7 @@ def test_what_is_not_pem_is_said_to_be_that(folder: CertificateFolder) -> None:
 def test_a_folder_that_was_copied_under_another_name_is_refused(folder: CertificateFolder) -> None:
     """Its process would be let in, and whatever it says denied without a word."""
     copytree(folder.path / "r2", folder.path / "r1", dirs_exist_ok=True)
-    with pytest.raises(ConfigError, match=r"got the certificate 'r2\.1', expected one of r1"):
+    with pytest.raises(ConfigError, match=r"got the certificate of 'r2', expected that of r1"):
         tls_files(str(folder.path), "r1")
     assert states(folder)["r1"] == "somebody else's (r2)"
 
@@ -127,62 +115,22 @@ def test_only_the_router_has_addresses_and_keeps_them(folder: CertificateFolder)
     assert folder.standings()[-1].certificate.hosts[0] == "10.0.0.2"
 
 
-def test_made_again_it_gives_only_those_without(folder: CertificateFolder) -> None:
+def test_made_again_it_gives_only_those_without_a_valid_one(folder: CertificateFolder) -> None:
+    folder.renew(["r2"], (), NOW - timedelta(days=9), 1.0)
     larger = CertificateFolder(folder.path, (*ROLL, "r3"))
-    assert larger.make("team", (), NOW, 30.0) == ["r3"]
-    assert names(larger)["r1"] == "r1.1"
+    before = (folder.path / "r1" / "certificate.pem").read_bytes()
+    assert larger.make("team", (), NOW, 30.0) == ["r2", "r3"]
+    assert states(larger) == dict.fromkeys((*ROLL, "r3"), "valid")
+    assert (folder.path / "r1" / "certificate.pem").read_bytes() == before
 
 
-def test_renewed_a_certificate_has_the_next_number_and_none_is_revoked(
-    folder: CertificateFolder,
-) -> None:
-    assert folder.renew(["r1"], (), NOW, 30.0) == ["r1.2"]
-    assert folder.renew((), (), NOW, 30.0) == ["r1.3", *(f"{name}.2" for name in ROLL[1:])]
-    assert revoked(folder) == {}
-
-
-def test_two_that_renew_at_once_give_two_numbers(folder: CertificateFolder) -> None:
-    with ThreadPoolExecutor(4) as pool:
-        given = pool.map(lambda _: folder.renew(["r1", "r2"], (), NOW, 30.0), range(4))
-    made = {name for names in given for name in names}
-    assert made == {f"{name}.{k}" for name in ("r1", "r2") for k in range(2, 6)}
-
-
-def test_revoked_are_all_that_were_given_so_far(folder: CertificateFolder) -> None:
-    folder.renew(["r1"], (), NOW, 30.0)
-    assert folder.revoke(["r1"]) == ["r1.1", "r1.2"]
-    assert revoked(folder) == {"r1": 2}
-    assert {each.identity for each in folder.standings() if each.revoked} == {"r1"}
-    assert folder.renew(["r1"], (), NOW, 30.0) == ["r1.3"]
-    assert not any(each.revoked for each in folder.standings())
-    assert folder.revoke(["r1"]) == ["r1.3"]
-
-
-def test_a_number_is_given_once_even_if_its_folder_is_lost(folder: CertificateFolder) -> None:
-    folder.revoke(["r2"])
-    (folder.path / "r2" / "certificate.pem").unlink()
-    folder.make("team", (), NOW, 30.0)
-    assert names(folder)["r2"] == "r2.2"
-
-
-def test_the_router_knows_only_so_many_names(folder: CertificateFolder) -> None:
-    for _ in range(MOST_VALID - 1):
-        folder.renew(["r1"], (), NOW, 30.0)
-    with pytest.raises(ConfigError, match="`quadriga certs revoke r1` first"):
-        folder.renew(["r1"], (), NOW, 30.0)
-
-
-@pytest.mark.parametrize("action", ["renew", "revoke"])
-def test_an_unknown_name_is_refused(folder: CertificateFolder, action: str) -> None:
+def test_renewed_are_those_that_are_named_or_all(folder: CertificateFolder) -> None:
+    assert folder.renew(["r1"], (), NOW, 3.0) == ["r1"]
+    days = {s.identity: round(s.certificate.days_left(NOW)) for s in folder.standings()}
+    assert days == dict.fromkeys(ROLL, 30) | {"r1": 3}
+    assert folder.renew((), (), NOW, 30.0) == [*ROLL]
     with pytest.raises(ConfigError, match="did you mean 'operator'"):
-        folder.renew(["operater"], (), NOW, 1.0) if action == "renew" else folder.revoke(
-            ["operater"]
-        )
-
-
-def test_the_router_is_not_revoked_by_itself(folder: CertificateFolder) -> None:
-    with pytest.raises(ConfigError, match="who connects to the router"):
-        folder.revoke(["router"])
+        folder.renew(["operater"], (), NOW, 1.0)
 
 
 def test_without_the_authority_nothing_is_renewed(tmp_path: Path) -> None:
@@ -210,7 +158,7 @@ def as_pem(content: bytes) -> bytes:
     [
         (b"\xa0\x03\x02\x01\x02", b"\xa0\x03\x02\x01\x15"),  # no version that there is
         (b"\x06\x03\x55\x1d\x0f", b"\x06\x03\x55\x1d\x13"),  # an extension twice
-        (b"\x0c\x08router.1", b"\x03\x08\x00outer.1"),  # a name of bits
+        (b"\x0c\x06router", b"\x03\x06\x00outer"),  # a name of bits
     ],
 )
 def test_a_certificate_that_no_library_takes_is_damaged(

@@ -13,8 +13,7 @@ from quadriga.recordings.metadata import build_metadata
 from quadriga.shared.config.timing import periods
 from quadriga.shared.errors import RecordingError
 from quadriga.shared.recording.config import recorded_config
-from quadriga.shared.recording.mcap_chunk import check_schema
-from quadriga.shared.recording.reader import Recording
+from quadriga.shared.recording.reader import Recording, check_schema
 from quadriga.shared.recording.writer import RecordingWriter
 from quadriga.shared.wire import messages as msg
 from quadriga.shared.wire.codec import encode

@@ -27,7 +27,7 @@ def test_every_command_has_a_section_with_its_own_options(page: str) -> None:
     for option in ("--view [PORT]", "--armed", "--out DIR"):
         assert f"`{option}`" in sections["walk"]
     assert "--terrain" not in sections["walk"], "it is an option of the configuration"
-    assert "`quadriga certs [options] make|renew|revoke|show [NAME …]`" in sections["certs"]
+    assert "`quadriga certs [options] make|renew|show [NAME …]`" in sections["certs"]
     assert "`--terrain flat" in page.partition("## Options of the configuration")[2]
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from quadriga.commands.config_options import read_config
 from quadriga.commands.parser import build_parser, main
-from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.bus.session import Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import SIM

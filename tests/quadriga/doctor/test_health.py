@@ -1,4 +1,4 @@
-"""Healthy is who answers, is ready, hears all others, agrees with them and is denied nothing."""
+"""Healthy is who answers, is ready, hears all others and agrees with them."""
 
 from __future__ import annotations
 
@@ -7,18 +7,17 @@ from dataclasses import replace
 import pytest
 
 from quadriga.doctor.health import judge_team
-from quadriga.shared.bus.absence import TeamView
+from quadriga.shared.bus.diagnostics import TeamView
 from quadriga.shared.members import team_members
 from quadriga.shared.wire.about import HERE, REFUSED, WARMING_UP
 from tests.shared.bus.abouts import NAMES, SIM, about, answer, view
 
 TEAM = [m for m in team_members(("r1", "r2"), central=False, recorded=False) if m.name in NAMES]
 EVERYBODY = (SIM, about("r1"), about("r2"))
-NOBODY: dict[str, str] = {}
 
 
-def lines(seen: TeamView, denied: dict[str, str] = NOBODY) -> dict[str, str]:
-    return {health.name: health.line for health in judge_team(TEAM, seen, denied)}
+def lines(seen: TeamView) -> dict[str, str]:
+    return {health.name: health.line for health in judge_team(TEAM, seen)}
 
 
 def r2_and(**changes: object) -> TeamView:
@@ -63,12 +62,6 @@ def test_who_lost_a_peer_is_not_well_either() -> None:
     found = lines(view(*left, here=frozenset({"sim", "r1"})))
     assert found["sim"] == found["r1"] == "not well: does not hear r2"
     assert found["r2"].startswith("not well: not on the bus")
-
-
-def test_who_is_denied_something_is_not_trusted() -> None:
-    found = lines(view(*EVERYBODY), {"r2": "the router denies it: put team/r1/command"})
-    assert found["r2"] == "not well: the router denies it: put team/r1/command"
-    assert found["r1"] == "well"
 
 
 def test_without_a_link_nothing_is_known_to_be_well() -> None:

@@ -12,7 +12,7 @@ from quadriga.doctor import readings
 from quadriga.doctor.machine import MachineNeed, MachineReadings, check_machine, need_of
 from quadriga.doctor.packages import check_packages
 from quadriga.doctor.readings import read_machine
-from quadriga.shared.bus.diagnosis import BAD, GOOD, NOTE, UNKNOWN
+from quadriga.shared.bus.diagnostics import BAD, GOOD, NOTE, UNKNOWN
 from quadriga.shared.config.load import load
 
 FIT = MachineReadings(

@@ -8,11 +8,10 @@ import re
 from quadriga.doctor import certificates, machine, packages, trust
 from quadriga.doctor.examine import LINK
 from quadriga.doctor.report import DoctorReport, MemberReport, format_report, to_json
-from quadriga.shared.bus import absence, distrust
-from quadriga.shared.bus.diagnosis import BAD, GOOD, NOTE, UNKNOWN, Diagnosis
+from quadriga.shared.bus import diagnostics
+from quadriga.shared.bus.diagnostics import BAD, GOOD, NOTE, UNKNOWN, Diagnosis
 from quadriga.shared.members import OPERATOR, RECORDER, ROUTER, SIM
 from quadriga.shared.runtime.places import SOURCE
-from quadriga.shared.security.refusals import UNTRUSTED
 from quadriga.shared.wire.about import REFUSED as NOT_GRANTED
 from tests.shared.bus.abouts import about, answer
 
@@ -65,14 +64,13 @@ def test_every_field_of_the_json_is_documented() -> None:
 def test_every_code_is_documented() -> None:
     values = {
         value
-        for module in (machine, packages, certificates, trust, absence, distrust)
+        for module in (machine, packages, certificates, trust, diagnostics)
         for name, value in vars(module).items()
         if name.isupper() and isinstance(value, str) and re.fullmatch(r"[a-z][a-z-]*[a-z]", value)
     }
     words = {GOOD, NOTE, BAD, UNKNOWN, SIM, OPERATOR, RECORDER, ROUTER, NOT_GRANTED}
-    words |= {UNTRUSTED}  # what a router calls it
     codes = {*values, LINK} - words
     assert {"not-started", "warming-up", "governor", "packages", "link"} <= codes
     assert {code for code in codes if f"`{code}`" not in DOC} == set()
     kinds = ("version", "messages", "configuration", "predictor", "code", "libraries")
-    assert all(f"`{absence.DIFFERS}{kind}`" in DOC for kind in kinds)
+    assert all(f"`{diagnostics.DIFFERS}{kind}`" in DOC for kind in kinds)

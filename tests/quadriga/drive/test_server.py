@@ -28,7 +28,7 @@ from quadriga.drive.client import ControlLink
 from quadriga.drive.controls import DriveControls
 from quadriga.drive.driver_words import DriverWord
 from quadriga.drive.server import DriveServer
-from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError

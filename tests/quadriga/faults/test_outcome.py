@@ -11,8 +11,8 @@ import pytest
 from quadriga.faults.outcome import Moment, describe_outcome, moment_at, tick_at
 from quadriga.recordings.events import read_events
 from quadriga.recordings.traces import read_traces
+from quadriga.shared.recording.metadata import END
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.recording.writer import END
 from quadriga.shared.wire import codes
 from quadriga.shared.wire.messages import Event, Message, State, Status
 from tests.quadriga.conftest import WALL, WALL_0, WriteRun, run_config

@@ -8,7 +8,7 @@ import pytest
 
 from quadriga.faults.fault import Stage
 from quadriga.faults.teller import FaultTeller
-from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import LAUNCHER, RECORDER, SIM

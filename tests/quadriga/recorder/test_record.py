@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import resource
-import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -18,12 +17,12 @@ from mcap.reader import make_reader
 
 from quadriga.commands.parser import main
 from quadriga.recordings.survey import survey
-from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
+from quadriga.shared.bus.session import HERE, READY, Bus
 from quadriga.shared.config.sections import BusConfig, Config, RecorderConfig, TeamConfig
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.members import RECORDER, SIM
+from quadriga.shared.recording.metadata import LOST, SINCE
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.recording.writer import LOST, SINCE
 from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns
 from quadriga.shared.wire.codec import encode
 from quadriga.shared.wire.messages import Command, Consumed, Plan, Reference
@@ -318,7 +317,7 @@ def test_a_full_file_system_is_named(start: Start, world: Bus, tmp_path: Path) -
 
 @pytest.mark.parametrize("lost", [0, 7])
 def test_at_once_waits_for_no_team(config: Config, start: Start, tmp_path: Path, lost: int) -> None:
-    """Lost messages are a failure; who was frozen meanwhile says so."""
+    """Lost messages are a failure."""
     with Bus.open(config.bus, "band", SIM) as hub:  # it never says that it is there
         recorder = start(hub, "--now")
         plan = Plan(40, 40, 1, np.zeros((25, 12)), np.zeros((25, 6)), "solved", {}, 0)
@@ -326,17 +325,12 @@ def test_at_once_waits_for_no_team(config: Config, start: Start, tmp_path: Path,
         hub.publisher("band/reference")(encode(Reference(0, 0, 0.0, 0.0, 0.0, 0.26)))
         hub.publisher("band/r1/state")(encode(state(10)))
         await_recorded(tmp_path / "run.mcap", 3)
-        if lost:
-            recorder.send_signal(signal.SIGSTOP)
-            sleep(2.5)
-            recorder.send_signal(signal.SIGCONT)
         hub.publisher("band/r1/state")(encode(state(11 + lost)))
         await_recorded(tmp_path / "run.mcap", 4)
         recorder.terminate()
-        out, err = recorder.communicate(timeout=WAIT)
+        out, _ = recorder.communicate(timeout=WAIT)
     assert recorder.returncode == bool(lost)
     assert f"4 messages, {lost} lost" in out
-    assert not lost or "this process stood still for" in err
     assert len(list(Recording(tmp_path / "run.mcap").entries())) == 4
 
 

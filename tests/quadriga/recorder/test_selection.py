@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from quadriga.recorder.selection import KeyFilter, Selection, own_keys
-from quadriga.shared.recording.admission import MAX_FOREIGN_KEYS
+from quadriga.shared.recording.quota import MAX_FOREIGN_KEYS
 from quadriga.shared.wire.topics import CLOCK
 
 

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.config.sections import BusConfig, Config, TeamConfig
 from quadriga.shared.members import SIM
 from quadriga.shared.runtime.clock import monotonic, sleep

@@ -9,8 +9,7 @@ from typing import Any, Final
 
 import msgpack
 
-from quadriga.shared.recording.mcap_chunk import ChunkEntry
-from quadriga.shared.recording.reader import Recording
+from quadriga.shared.recording.reader import ChunkEntry, Recording
 from quadriga.shared.recording.writer import RecordingWriter
 
 BIN8: Final = 0xC4

@@ -210,35 +210,6 @@ def test_a_planner_that_keeps_state_in_its_instance_is_found_and_named(
         assert "keeps state outside" in format_outcome(outcome)
 
 
-def test_a_state_that_the_agent_did_not_believe_is_not_replayed(tmp_path: Path) -> None:
-    """A forged one far ahead, then a silence, after which the true one of its tick comes."""
-    run, config = tmp_path / "run.mcap", configured(world__mode="realtime")
-    agent = Agent(config, "r1", None)
-    arrivals = Inbox(config, "r1", agent.peers)
-    memory, intake, last = agent.initial(), Intake(config, arrivals), -1
-    states = [standing(tick) for tick in (*range(20), *range(195, 210))]
-    states.insert(10, standing(200, lean=0.3))
-    answered = []
-    with RecordingWriter(run, build_metadata(config, "")) as to:
-        for state in states:
-            arrivals.take("team/r1/state", encode(state))
-            to.write("team/r1/state", encode(state), 0)
-            taken = arrivals.pop_state()
-            if taken is None:
-                continue
-            inputs = arrivals.pop_inputs(taken, awaited := agent.expected(taken.tick))
-            if record := intake.record(last, inputs, awaited):
-                to.write("team/r1/inputs", encode(record), 0)
-            memory, outputs = agent.step(memory, inputs)
-            to.write("team/r1/command", encode(outputs.command), 0)
-            last = taken.tick
-            answered.append(last)
-    assert answered == [*range(20), *range(196, 210)], "195 is confirmed by 196"
-    (outcome,) = replay(run, (), {}, None, None, Console())
-    assert outcome.verdict.exact
-    assert outcome.verdict.equal["command"] == len(answered)
-
-
 def test_a_cut_recording_is_replayed_up_to_the_cut_and_said_to_be_cut(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

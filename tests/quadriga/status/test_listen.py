@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from quadriga.commands.parser import main
-from quadriga.shared.bus.introduction import Introduction
-from quadriga.shared.bus.roster import processes
-from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
+from quadriga.shared.bus.membership import processes
+from quadriga.shared.bus.process_info import ProcessInfo
+from quadriga.shared.bus.session import HERE, READY, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.wire.codec import encode
@@ -37,7 +37,7 @@ def assemble(stack: ExitStack, of: Config) -> dict[str, Bus]:
     buses = {}
     for member in processes(of):
         bus = stack.enter_context(Bus.open(of.bus, of.team.name, member.name))
-        Introduction(bus, of)
+        ProcessInfo(bus, of)
         buses[member.name] = bus
     for stage in (HERE, READY):
         for bus in buses.values():

@@ -13,7 +13,7 @@ from threading import Thread
 import numpy as np
 import pytest
 
-from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import pytest
 
-from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.config.sections import BusConfig, Config
 from quadriga.shared.errors import ConfigError
 from quadriga.team.endpoint import endpoint_claimed, free_endpoint, with_free_endpoint

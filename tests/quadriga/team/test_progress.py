@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from quadriga.shared.bus.zenoh_bus import HERE, READY, Bus
+from quadriga.shared.bus.session import HERE, READY, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.members import SIM
 from quadriga.shared.runtime.clock import monotonic, sleep

@@ -12,7 +12,7 @@ from quadriga.commands.parser import main
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config, TeamConfig
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.recording.writer import RECORDING
+from quadriga.shared.recording.metadata import RECORDING
 from quadriga.team.run_folder import make_run_dir
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from quadriga.commands.parser import main
 from quadriga.shared import members
-from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml

@@ -9,7 +9,7 @@ import pytest
 
 from quadriga.drive.controls import DriveControls
 from quadriga.drive.server import DriveServer
-from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.bus.session import Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.members import OPERATOR
 from quadriga.shared.runtime.clock import monotonic, sleep

@@ -9,7 +9,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from quadriga.shared.bus.newest import Newest
+from quadriga.shared.bus.ring_buffer import Newest
 from quadriga.shared.config.sections import Config
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.wire.codec import encode

@@ -21,7 +21,7 @@ from rich.console import Console
 from websockets.exceptions import InvalidStatus
 
 from quadriga.commands.parser import main
-from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.config.sections import BusConfig, Config
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.runtime.clock import monotonic, sleep

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any, Final
 
-from quadriga.shared.bus.absence import MemberAnswer, TeamView
-from quadriga.shared.bus.agreement import TeamNorm
+from quadriga.shared.bus.diagnostics import MemberAnswer, TeamNorm, TeamView
 from quadriga.shared.wire.about import ORDINARY, READY, About
 
 NAMES: Final = frozenset({"sim", "r1", "r2"})

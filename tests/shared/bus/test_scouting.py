@@ -7,7 +7,7 @@ from typing import Final
 import pytest
 import zenoh
 
-from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.bus.session import Bus
 from quadriga.shared.config.sections import BusConfig
 from quadriga.shared.runtime.clock import sleep
 from quadriga.team.endpoint import free_endpoint

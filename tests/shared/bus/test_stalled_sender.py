@@ -10,7 +10,7 @@ from multiprocessing.synchronize import Event
 import pytest
 
 from benchmarks.children import SPAWN, child, running
-from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import SIM

@@ -10,7 +10,7 @@ from contextlib import ExitStack, contextmanager
 
 import pytest
 
-from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.config.sections import BusConfig
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.team.endpoint import free_endpoint
@@ -22,14 +22,14 @@ CHUNK, CHUNKS = bytes(50_000), 400  # more than all that waits between a router 
 
 ROUTER = """
 import sys
-from quadriga.shared.bus.zenoh_bus import Bus
+from quadriga.shared.bus.session import Bus
 with Bus.route(sys.argv[1], "team"):
     print(flush=True)
     input()
 """
 RECORDER = """
 import sys
-from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.config.sections import BusConfig
 with Bus.open(BusConfig(endpoint=sys.argv[1], mode="client"), "team", "recorder") as bus:
     bus.subscribe("team/**")

@@ -12,7 +12,7 @@ from threading import local
 import pytest
 
 from quadriga.shared.bus import zenoh_threads
-from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.runtime.clock import sleep
 from quadriga.team.endpoint import free_endpoint
@@ -20,7 +20,7 @@ from quadriga.team.endpoint import free_endpoint
 PROGRAM = """
 import os, sys, time
 from pathlib import Path
-from quadriga.shared.bus.zenoh_bus import HERE, Bus
+from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.config.load import load
 
 endpoint, who, wanted = sys.argv[1:]

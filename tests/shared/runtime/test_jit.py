@@ -146,7 +146,7 @@ def test_the_sources_are_those_with_compiled_functions_and_what_they_import() ->
     assert (
         not {
             "quadriga/agents/process.py",
-            "quadriga/shared/bus/zenoh_bus.py",
+            "quadriga/shared/bus/session.py",
             "quadriga/sim_server/world/world.py",
         }
         & found

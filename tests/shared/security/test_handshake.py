@@ -15,17 +15,15 @@ import pytest
 from quadriga.certs.folder import CertificateFolder
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.runtime.clock import wall_ns
+from quadriga.shared.security.certificates import EXPIRED, NOT_YET_VALID, TlsFiles, tls_files
 from quadriga.shared.security.handshake import (
     CAUSES,
-    EXPIRED,
-    NOT_YET_VALID,
     REFUSED,
     TRUSTED,
     UNREACHABLE,
     UNTRUSTED,
     shake_hands,
 )
-from quadriga.shared.security.tls import TlsFiles, tls_files
 
 NOW = datetime.fromtimestamp(1e-9 * wall_ns(), UTC)
 LONG_AGO = NOW - timedelta(days=10)

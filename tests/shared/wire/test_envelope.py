@@ -6,8 +6,7 @@ import msgpack
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quadriga.shared.wire.codec import MAX_INTEGER, MAX_TICK, encode
-from quadriga.shared.wire.envelope import envelope
+from quadriga.shared.wire.codec import MAX_INTEGER, MAX_TICK, encode, envelope
 from quadriga.shared.wire.messages import EStop, Event
 
 ticks = st.integers(0, MAX_TICK - 1)

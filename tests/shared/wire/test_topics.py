@@ -113,7 +113,6 @@ def test_the_keys_are_the_contract_with_other_tools() -> None:
         "team/injected",
         "team/clock",
         "team/r1/posture",
-        "team/refused",
     ]
 
 

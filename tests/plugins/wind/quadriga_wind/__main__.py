@@ -10,13 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
-from quadriga.shared.bus.zenoh_bus import HERE, POLL, Bus
+from quadriga.shared.bus.session import HERE, POLL, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.errors import QuadrigaError
 from quadriga.shared.members import has_lead
 from quadriga.shared.runtime.clock import sleep
-from quadriga.shared.wire.codec import decode, encode
-from quadriga.shared.wire.envelope import envelope
+from quadriga.shared.wire.codec import decode, encode, envelope
 from quadriga.shared.wire.messages import Event
 from quadriga.shared.wire.topics import EVENT, TRUTH
 

@@ -8,7 +8,7 @@ from ipaddress import IPv4Network, ip_address
 import pytest
 
 from quadriga.faults.network.layout import NETWORKS, TEAM, NetworkLayout
-from quadriga.shared.bus.zenoh_settings import member_settings
+from quadriga.shared.bus.settings import member_settings
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import OPERATOR, RECORDER, SIM
 

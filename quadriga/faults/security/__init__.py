@@ -1,1 +1,0 @@
-"""Forgers, strangers and certificates that end: faults of who may say what."""

@@ -1,0 +1,317 @@
+"""Who of a team is missing, who is not as it should be, and why: from tokens and answers. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Final, NamedTuple
+
+from quadriga.shared.errors import BusError
+from quadriga.shared.members import SIM, Member
+from quadriga.shared.wire.about import HERE, READY, STAGES, STARTED, WARMING_UP, About
+from quadriga.shared.wire.about import REFUSED as NOT_GRANTED
+
+GOOD: Final = "good"
+NOTE: Final = "note"  # worth knowing, and nothing is wrong
+BAD: Final = "bad"
+UNKNOWN: Final = "unknown"  # it could not be looked at
+
+NOT_STARTED: Final = "not-started"
+NO_LINK: Final = "no-link"
+NOT_ANSWERING: Final = "not-answering"
+FOREIGN: Final = "foreign"
+NOT_REACHABLE: Final = "not-reachable"
+UNREADABLE: Final = "unreadable"
+TWO_OF_A_NAME: Final = "two-of-a-name"
+DIFFERS: Final = "other-"  # and what: `other-configuration`
+CLOCK_OFF: Final = "clock-off"
+NOT_SEEN: Final = "not-seen"
+NOT_REALTIME: Final = "not-realtime"
+
+CLOCK_LIMIT: Final = 0.1  # s, by which system clocks may differ: recordings are read by them
+PACE_LIMIT: Final = 1e-3  # s, by which those of plants may that pace their robots by them
+CLOCK_REMEDY: Final = "keep the clocks of all computers by PTP (ptp4l, phc2sys) or chrony"
+_PACED: Final = frozenset({'team.plants="each"', 'world.mode="realtime"'})  # of the configuration
+# In what processes may differ, in the order in which it is told, and what to do about it.
+REMEDIES: Final[Mapping[str, str]] = {
+    "version": "install the same version of quadriga on all computers",
+    "messages": "the versions are the same and the messages are not: install the same files",
+    "configuration": "all processes of a team read the same file: copy it, give the same options",
+    "predictor": "copy the predictor's file and name it with --predictor, or fit both by the same "
+    "code",
+    "code": "the versions are the same and the source files are not: update both",
+    "libraries": "the last digits of plans may differ; requirements.lock has the versions",
+}
+DECISIVE: Final = frozenset(("version", "messages", "configuration", "predictor"))
+_SHOWN: Final = 3  # keys or libraries that are named
+_DIGITS: Final = 12  # of a digest
+_STAGES: Final = {
+    STARTED: (NOTE, "on the bus, has not announced itself yet"),
+    HERE: (NOTE, "here, waits for the others"),
+    WARMING_UP: (NOTE, "still warming up"),
+    READY: (GOOD, "ready"),
+}
+
+
+class ClockOffset(NamedTuple):
+    """How far one system clock is ahead of another, and how far that may be off, s."""
+
+    ahead: float
+    error: float
+
+    def __sub__(self, other: ClockOffset) -> ClockOffset:
+        """The offset between two clocks that were both compared with a third."""
+        return ClockOffset(self.ahead - other.ahead, self.error + other.error)
+
+    def exceeds(self, limit: float) -> bool:
+        """Whether the clocks differ by more than `limit` for sure."""
+        return abs(self.ahead) - self.error > limit
+
+    def __str__(self) -> str:
+        size, direction = abs(self.ahead), "ahead of" if self.ahead > 0.0 else "behind"
+        return f"{size:.3g} s {direction}" if size >= 1.0 else f"{1e3 * size:.3g} ms {direction}"
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosis:
+    """What came of one look at a process or a computer.
+
+    Attributes:
+        code: what was found or looked at, for programs.
+        verdict: `GOOD`, `NOTE`, `BAD` or `UNKNOWN`.
+        text: the same in words.
+        remedy: what to do about it; "": nothing.
+    """
+
+    code: str
+    verdict: str
+    text: str
+    remedy: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class TeamNorm:
+    """What all must agree with.
+
+    Attributes:
+        lead: what the process that drives the team's time says of itself.
+        predictor: digest of the predictor of the first process that plans; "": unknown.
+        planner: the name of that process.
+    """
+
+    lead: About
+    predictor: str = ""
+    planner: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Disagreement:
+    """In what one process differs.
+
+    Attributes:
+        of: a key of `REMEDIES`; no team walks with those of `DECISIVE`.
+        got: what it has.
+        wanted: what it should have.
+        owner: the process that has this.
+    """
+
+    of: str
+    got: str
+    wanted: str
+    owner: str
+
+
+@dataclass(frozen=True, slots=True)
+class MemberAnswer:
+    """What one process has said of itself.
+
+    Attributes:
+        about: None: it cannot be read.
+        asked_ns: when it was asked, by the asker's wall clock.
+        arrived_ns: when the answer came, by the same clock.
+    """
+
+    about: About | None
+    asked_ns: int
+    arrived_ns: int
+
+    @property
+    def clock_offset(self) -> ClockOffset:
+        """How far its system clock is ahead of the asker's; zeros if it cannot be read."""
+        if self.about is None:
+            return ClockOffset(0.0, 0.0)
+        middle, round_trip = (self.asked_ns + self.arrived_ns) // 2, self.arrived_ns - self.asked_ns
+        return ClockOffset(1e-9 * (self.about.wall_ns - middle), 5e-10 * round_trip)
+
+
+@dataclass(frozen=True, slots=True)
+class TeamView:
+    """What one process sees of a team at one moment.
+
+    Attributes:
+        linked: whether it is linked to anybody at all.
+        here: names of those that have announced themselves.
+        doubled: names that two processes carry.
+        names: all that the team should have.
+        answers: what was said, by name; processes of one name answer each.
+        norm: what all must agree with; None: unknown.
+    """
+
+    linked: bool
+    here: frozenset[str]
+    doubled: frozenset[str]
+    names: frozenset[str]
+    answers: Mapping[str, Sequence[MemberAnswer]] = field(default_factory=dict)
+    norm: TeamNorm | None = None
+
+    def about(self, name: str) -> About | None:
+        """What a process has said of itself; of several of one name the one that is further."""
+        said = [answer.about for answer in self.answers.get(name, ()) if answer.about is not None]
+        return max(said, key=lambda about: STAGES.index(about.stage), default=None)
+
+
+def diagnose(member: Member, view: TeamView) -> tuple[Diagnosis, ...]:
+    """All there is to say of a member: why it is not there, or how far it is and what is wrong."""
+    about = view.about(member.name)
+    doubled = tuple(_two_of_a_name(member.name, view))
+    if about is not None:
+        stage, differs = _explain_stage(about, view), _find_differences(about, view)
+        return (*doubled, *stage, *differs, *_compare_clocks(member, view))
+    return (*doubled, _explain_silence(member, view))
+
+
+def describe_absent(absent: Collection[Member], view: TeamView) -> str:
+    """Why some are not there, in one line: those of one reason together."""
+    by_reason: dict[str, list[str]] = {}
+    for member in absent:
+        found = diagnose(member, view)
+        wrong = [item for item in found if item.verdict == BAD] or found
+        by_reason.setdefault(", ".join(item.text for item in wrong), []).append(member.name)
+    return "; ".join(f"{', '.join(names)}: {reason}" for reason, names in by_reason.items())
+
+
+def disagreements(process: About, norm: TeamNorm) -> tuple[Disagreement, ...]:
+    """In what a process differs from the others; of another version nothing else is compared."""
+    lead = norm.lead
+    if process.version != lead.version:
+        got, wanted = process.version or "not installed", lead.version or "not installed"
+        return (Disagreement("version", got, wanted, lead.name),)
+    found = list[Disagreement]()
+    own, its = _by_name(process.messages, " "), _by_name(lead.messages, " ")
+    shared = own.keys() & its.keys()  # topics of a plug-in need not be known to all
+    for of, mine, theirs in (
+        ("messages", {n: own[n] for n in shared}, {n: its[n] for n in shared}),
+        ("configuration", _by_name(process.config, "="), _by_name(lead.config, "=")),
+        ("libraries", _by_name(process.libraries, " "), _by_name(lead.libraries, " ")),
+    ):
+        names = [name for name in sorted({*mine, *theirs}) if mine.get(name) != theirs.get(name)]
+        if names:
+            got, wanted = _name_values(names, mine), _name_values(names, theirs)
+            found.append(Disagreement(of, got, wanted, lead.name))
+    if process.predictor and norm.predictor and process.predictor != norm.predictor:
+        got, wanted = process.predictor[:_DIGITS], norm.predictor[:_DIGITS]
+        found.append(Disagreement("predictor", got, wanted, norm.planner))
+    if process.code != lead.code:
+        found.append(Disagreement("code", process.code, lead.code, lead.name))
+    return tuple(sorted(found, key=lambda item: list(REMEDIES).index(item.of)))
+
+
+def refuse(name: str, team: str, found: Iterable[Disagreement]) -> None:
+    """Refuse a process that differs in what no team walks with.
+
+    Args:
+        name: the process.
+        team: the team's name.
+        found: in what it differs.
+
+    Raises:
+        BusError: it does; the message names what, for instance the keys of the configuration.
+    """
+    for item in found:
+        if item.of in DECISIVE:
+            expected = f"{item.wanted} as {item.owner} has it"
+            what = f"{item.of} of {name} in team {team!r}"
+            raise BusError(what, item.got, expected, REMEDIES[item.of])
+
+
+def _by_name(lines: Iterable[str], separator: str) -> dict[str, str]:
+    split = (line.partition(separator) for line in lines)
+    return {name: value for name, _, value in split}
+
+
+def _name_values(names: list[str], values: Mapping[str, str]) -> str:
+    """Some of the values, with their names, and how many more there are."""
+    named = [f"{name} {values.get(name, 'unknown')}" for name in names[:_SHOWN]]
+    more = len(names) - len(named)
+    return ", ".join(named) + (f" and {more} more" if more else "")
+
+
+def _explain_silence(member: Member, view: TeamView) -> Diagnosis:
+    name = member.name
+    if view.answers.get(name):
+        text = "says what this version cannot read"
+        return Diagnosis(UNREADABLE, BAD, text, "another version of quadriga: install the same one")
+    if name in view.here:
+        if member.foreign:
+            return Diagnosis(FOREIGN, NOTE, "here, a controller of one's own that answers nothing")
+        cause = "frozen or overloaded, or an earlier version of quadriga: see its log, restart it"
+        return Diagnosis(NOT_ANSWERING, BAD, "here, but does not answer", cause)
+    abouts = ((other, view.about(other)) for other in view.answers)
+    witnesses = sorted(other for other, about in abouts if about and name in about.sees)
+    if witnesses:
+        text = f"seen by {', '.join(witnesses)}, but not from here"
+        cause = "frozen, or in peer mode its bus.listen cannot be reached from here"
+        return Diagnosis(NOT_REACHABLE, BAD, text, cause)
+    if not view.linked:
+        return Diagnosis(NO_LINK, BAD, "no link to anyone")  # the way there is another matter
+    text = "not on the bus: not started, failed, or another bus.endpoint or team.name"
+    robot = f" --robot {member.robot}" if member.robot else ""
+    real = ", of a real robot `bridge`" if member.role.name == SIM else ""
+    command = f"`quadriga {member.role.command}{robot}`{real}"
+    return Diagnosis(NOT_STARTED, BAD, text, f"start it ({command}), or look at what it said")
+
+
+def _two_of_a_name(name: str, view: TeamView) -> Iterator[Diagnosis]:
+    said = [answer.about for answer in view.answers.get(name, ()) if answer.about is not None]
+    announced = [about for about in said if about.stage != STARTED]  # a late recorder is none
+    if name not in view.doubled and len(announced) < 2:
+        return
+    where = " and ".join(f"{about.host}:{about.pid}" for about in announced)
+    text = f"two processes of this name{f', {where}' if len(announced) > 1 else ''}"
+    yield Diagnosis(TWO_OF_A_NAME, BAD, text, "stop one of them, or give one team another name")
+
+
+def _explain_stage(about: About, view: TeamView) -> Iterator[Diagnosis]:
+    verdict, text = _STAGES[about.stage]
+    missed = view.names - {about.name, *about.sees}
+    if about.stage == HERE and missed:
+        text = f"here, waits for {', '.join(sorted(missed))}"
+    yield Diagnosis(about.stage, verdict, text)
+    unseen = sorted(missed & view.here)
+    if about.stage != STARTED and unseen:
+        cause = "in peer mode bus.listen of each must be reachable for all others; a firewall?"
+        yield Diagnosis(NOT_SEEN, BAD, f"does not see {', '.join(unseen)}", cause)
+    if about.scheduling == NOT_GRANTED:
+        cause = "permit it: LimitRTPRIO=1 in its unit, or rtprio 1 in /etc/security/limits.d"
+        yield Diagnosis(NOT_REALTIME, BAD, "has no real-time scheduling", cause)
+
+
+def _find_differences(about: About, view: TeamView) -> Iterator[Diagnosis]:
+    for item in disagreements(about, view.norm) if view.norm else ():
+        verdict = BAD if item.of in DECISIVE else NOTE
+        text = f"another {item.of}: {item.got}, {item.owner} has {item.wanted}"
+        yield Diagnosis(f"{DIFFERS}{item.of}", verdict, text, REMEDIES[item.of])
+
+
+def _compare_clocks(member: Member, view: TeamView) -> Iterator[Diagnosis]:
+    """That its system clock is off: against this computer's, or by which plants pace robots."""
+    leader = view.norm.lead if view.norm else None
+    paces = member.role.name == SIM and leader is not None and _PACED.issubset(leader.config)
+    led = [said.clock_offset for said in view.answers.get(leader.name, ())] if leader else []
+    for answer in view.answers[member.name]:
+        if answer.clock_offset.exceeds(CLOCK_LIMIT):
+            text = f"its system clock is {answer.clock_offset} this computer's"
+            yield Diagnosis(CLOCK_OFF, BAD, text, CLOCK_REMEDY)
+        elif paces and led and (offset := answer.clock_offset - led[0]).exceeds(PACE_LIMIT):
+            text = f"its system clock is {offset} that of the plant which drives time"
+            yield Diagnosis(CLOCK_OFF, BAD, text, CLOCK_REMEDY)

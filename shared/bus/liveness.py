@@ -1,0 +1,173 @@
+"""The plant or the link to the router may disappear: when that ends a process, and its error."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from datetime import UTC, datetime
+from typing import Final, NamedTuple
+
+from quadriga.shared.bus.discovery import log
+from quadriga.shared.bus.membership import lead
+from quadriga.shared.bus.session import HERE, Bus
+from quadriga.shared.config.sections import Config
+from quadriga.shared.config.timing import waits_for_router
+from quadriga.shared.errors import ProcessError
+from quadriga.shared.members import has_lead
+from quadriga.shared.runtime.clock import monotonic, wall_ns
+from quadriga.shared.wire.codes import LEAD_GONE, LINK_LOST
+
+_MISSED: Final = re.compile(r", missed since (\S+Z),")
+LAST_PACKETS: Final = 1.0  # s wall, in which what was sent before may still arrive
+
+
+class Loss(NamedTuple):
+    """What has vanished: `LEAD_GONE` or `LINK_LOST`, and its name."""
+
+    code: str
+    what: str
+
+
+def find_lost_link(bus: Bus, config: Config) -> Loss | None:
+    """The link to the router, if there ought to be one and is none at the moment."""
+    if config.bus.mode != "client" or bus.linked:
+        return None
+    return Loss(LINK_LOST, f"link of {bus.name} to the router at {config.bus.endpoint}")
+
+
+def find_loss(bus: Bus, config: Config) -> Loss | None:
+    """What is gone at the moment of that on which a process depends; None if all is there."""
+    link = find_lost_link(bus, config)
+    if link is not None:  # then everybody else seems to be gone, too
+        return link
+    if not has_lead(bus.members_at(HERE)):
+        return Loss(LEAD_GONE, f"process {lead(config)} of team {bus.team!r}, seen by {bus.name}")
+    return None
+
+
+def loss_error(loss: Loss, tick: int, missed_ns: int = 0) -> ProcessError:
+    """The error of a process that ends because of a loss.
+
+    Args:
+        loss: what has vanished.
+        tick: the team's time as far as this process knows it, ms.
+        missed_ns: when it was missed first, ns since 1970; 0: that is not known.
+    """
+    cause = "killed, failed, or cut off: see what it says itself"
+    if loss.code == LINK_LOST:
+        cause = "the router was killed, the network is gone, or a certificate has expired"
+    got = f"none any more after {tick / 1000:.3f} s of the walk"
+    if missed_ns:
+        moment = datetime.fromtimestamp(1e-9 * missed_ns, UTC)
+        got += f", missed since {moment.isoformat(timespec='milliseconds')[:-6]}Z"
+    return ProcessError(loss.what, got, "it to be there until the walk's announced end", cause)
+
+
+def missed_ns_of(line: str) -> int:
+    """When something was missed first, of a line that shows a `loss_error`; 0 of any other line.
+
+    Returns:
+        ns since 1970, to the ms.
+    """
+    found = _MISSED.search(line)
+    if found is None:
+        return 0
+    return 1_000_000 * round(1e3 * datetime.fromisoformat(found[1]).timestamp())
+
+
+class LossTimer:
+    """How long something is gone already, and whether it is gone for good.
+
+    A router may be started again. Then each process finds it by itself, so that who drives time is
+    absent for longer, too.
+
+    Args:
+        find: what is gone at the moment; None: nothing.
+        config: the team's configuration.
+        grace: s, after which a loss is one that has nothing to do with the router.
+
+    Attributes:
+        since: when the loss was seen first, s of the clock; None: there is none.
+    """
+
+    def __init__(self, find: Callable[[], Loss | None], config: Config, grace: float) -> None:
+        self._find, self._grace = find, grace
+        waits = waits_for_router(config)
+        self._of_link = max(grace, config.bus.reconnect_timeout) if waits else grace
+        self._patience = grace
+        self.since: float | None = None
+
+    def poll(self) -> Loss | None:
+        """What is gone for good; None if all is there, or may be back."""
+        loss = self._find()
+        if loss is None:
+            self.clear()
+            return None
+        now = monotonic()
+        if self.since is None:
+            self.since = now
+        if loss.code == LINK_LOST:
+            self._patience = self._of_link
+        return loss if now - self.since >= self._patience else None
+
+    @property
+    def missed_ns(self) -> int:
+        """When the loss was seen first, ns since 1970; 0: there is none."""
+        return 0 if self.since is None else wall_ns() - round(1e9 * (monotonic() - self.since))
+
+    def clear(self) -> None:
+        """All is there again."""
+        self.since, self._patience = None, self._grace
+
+
+class Liveness:
+    """Ends a process whose team is gone, and says what has vanished.
+
+    The last packets of who drives time may arrive after its token has vanished, and they announce
+    the end of the walk. So a loss counts after `LAST_PACKETS`, and that of a router as `LossTimer`
+    tells.
+
+    Args:
+        bus: the process's own, in the midst of a walk.
+        config: the team's configuration.
+    """
+
+    def __init__(self, bus: Bus, config: Config) -> None:
+        self._timer = LossTimer(lambda: find_loss(bus, config), config, LAST_PACKETS)
+        self._bus, self._config = bus, config
+        self._walks = False
+        self._silent_since: float | None = None  # since the end was announced
+
+    def is_over(self, *, announced: bool) -> bool:
+        """Whether the walk is over: its end was announced, and did come.
+
+        Whoever reaches the bus may announce one. A team whose time goes on has not ended.
+        """
+        if not announced:
+            return False
+        now = monotonic()
+        if self._silent_since is None:
+            self._silent_since = now
+        return now - self._silent_since >= LAST_PACKETS or bool(find_loss(self._bus, self._config))
+
+    def poll(self, tick: int) -> None:
+        """See whether the others are there; called while nothing arrives.
+
+        Args:
+            tick: the team's time as far as this process knows it, ms.
+
+        Raises:
+            ProcessError: who drives time, or the link to the router, is gone for good.
+        """
+        loss = self._timer.poll()
+        if loss is not None:
+            raise loss_error(loss, max(tick, 0), self._timer.missed_ns)
+
+    def receive(self) -> None:
+        """Something has arrived: the team walks, and who was gone is back."""
+        self._silent_since = None
+        if not self._walks:
+            self._walks = True
+            log(f"{self._bus.name}: the team walks")
+        if self._timer.since is not None:
+            self._timer.clear()

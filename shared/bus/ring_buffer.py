@@ -1,0 +1,95 @@
+"""What other threads put in and one thread takes out: a bounded queue, and the newest of a key."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from contextlib import suppress
+from threading import Lock
+from typing import Any, Final, Generic, NamedTuple, TypeVar
+
+from quadriga.shared.runtime.clock import monotonic
+
+INBOX: Final = 1 << 16  # packets that wait for a process at most, some seconds of ten robots
+Item = TypeVar("Item")
+
+
+class Mailbox(Generic[Item]):
+    """A queue for many threads that put and one that takes.
+
+    `queue.SimpleQueue` is no substitute: in Python 3.11 its `get` may wait for ever, whatever its
+    timeout, when a signal's handler or a busy computer takes up the time that was left. It then
+    computes a negative rest, which it takes for no limit. To put into and
+    take from a `queue.Queue` costs ten times as much.
+
+    Args:
+        most: how many items wait at most: one more drops the oldest, so that who is too slow for
+            its senders does not fill the memory; 0: no limit.
+
+    Attributes:
+        dropped: how many items were dropped so.
+    """
+
+    def __init__(self, most: int = 0) -> None:
+        self.dropped = 0
+        self._items: deque[Item] = deque(maxlen=most or None)
+        self._empty = Lock()  # released by `put`; whoever waits for an item acquires it
+        self._empty.acquire()
+
+    def __len__(self) -> int:
+        return len(self._items)
+
+    def put(self, item: Item) -> None:
+        """Add an item, from any thread."""
+        if len(self._items) == self._items.maxlen:
+            self.dropped += 1
+        self._items.append(item)
+        if self._empty.locked():
+            with suppress(RuntimeError):  # another thread has released it since
+                self._empty.release()
+
+    def take(self, timeout: float) -> Item | None:
+        """The oldest item, waiting at most `timeout` seconds for one; None if none comes."""
+        if self._items:
+            return self._items.popleft()
+        deadline = monotonic() + timeout
+        # The lock may be free because of an item that was taken without waiting: then look again.
+        while self._empty.acquire(timeout=max(0.0, deadline - monotonic())):
+            if self._items:
+                return self._items.popleft()
+        return None
+
+    def drain(self) -> list[Item]:
+        """All items that are there, oldest first, without waiting."""
+        return [self._items.popleft() for _ in range(len(self._items))]
+
+
+class Fresh(NamedTuple):
+    """What has come since the last poll.
+
+    Attributes:
+        messages: how many came; fewer than were sent, where more came than are kept.
+        payloads: the newest of them, oldest first.
+    """
+
+    messages: int
+    payloads: list[bytes]
+
+
+class Newest:
+    """The newest messages of a key, for whoever polls now and then and waits for none of them.
+
+    Args:
+        receive: gives the oldest message that is kept and forgets it; None: there is none.
+    """
+
+    def __init__(self, receive: Callable[[], Any]) -> None:
+        self._receive = receive
+
+    def take(self, wanted: int) -> Fresh:
+        """What has come since this was called last, with at most `wanted` payloads."""
+        count, newest = 0, deque[Any](maxlen=wanted)
+        while (sample := self._receive()) is not None:
+            count += 1
+            newest.append(sample)
+        return Fresh(count, [sample.payload.to_bytes() for sample in newest])

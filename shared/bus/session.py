@@ -1,0 +1,419 @@
+"""The bus: a session of Zenoh with publishers, one inbox, tokens. The only import of zenoh."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import sys
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import nullcontext, suppress
+from queue import SimpleQueue
+from types import MappingProxyType
+from typing import Any, Final, Self
+
+import zenoh
+
+from quadriga.shared.bus.endpoint import check_trust, tls_of
+from quadriga.shared.bus.membership import Presence
+from quadriga.shared.bus.ring_buffer import INBOX, Mailbox, Newest
+from quadriga.shared.bus.settings import NO_LINK, member_settings, opening_error, router_settings
+from quadriga.shared.bus.zenoh_threads import one_thread_receives, staying_attached
+from quadriga.shared.config.sections import BusConfig
+from quadriga.shared.errors import BusError
+from quadriga.shared.members import ROUTER
+from quadriga.shared.runtime.clock import monotonic, monotonic_ns, sleep, wall_ns
+from quadriga.shared.wire.about import HERE as HERE
+from quadriga.shared.wire.about import READY as READY
+from quadriga.shared.wire.topics import RECEIVED
+
+Packet = tuple[str, bytes]  # key, payload as received
+Arrival = tuple[int, str, bytes]  # when, ns of `monotonic_ns`, and the packet
+Answer = tuple[int, str, bytes]  # when, ns of the wall clock, and key and payload
+
+POLL: Final = 0.05  # s, longest wait before a loop looks at its stop flag
+_ACK_TIMEOUT: Final = 2.0  # s
+_LINK_TIMEOUT: Final = 5.0  # s
+_QUIET: Final = 5.0  # s without a router that are not logged
+
+
+def pause() -> None:
+    """Some milliseconds until the next look."""
+    sleep(0.005)
+
+
+class Answers:
+    """The answers to one question; a thread that receives them fills it, another one reads it.
+
+    Attributes:
+        asked_ns: when the question was asked, by the wall clock.
+        over: whether nothing more will come: all who can answer have, or the time is over.
+    """
+
+    def __init__(self, asked_ns: int) -> None:
+        self.asked_ns = asked_ns
+        self.over = False
+        self._answers: SimpleQueue[Answer] = SimpleQueue()
+
+    def note(self, at_ns: int, key: str, payload: bytes) -> None:
+        """An answer has come."""
+        self._answers.put((at_ns, key, payload))
+
+    def end(self) -> None:
+        """Nothing more will come."""
+        self.over = True
+
+    def take(self) -> list[Answer]:
+        """All that has come since this was called last, oldest first."""
+        return [self._answers.get_nowait() for _ in range(self._answers.qsize())]
+
+
+class Bus:
+    """One process's connection to its team.
+
+    Every subscription feeds one inbox, so a process waits in one place. Presence is a liveliness
+    token `<team>/<name>/<stage>/<session>`: it vanishes within milliseconds when its process dies,
+    and the session in it tells two processes of the same name apart.
+
+    A process's last packets may arrive after its token has vanished.
+    """
+
+    def __init__(self, session: zenoh.Session, team: str, name: str) -> None:
+        """Use `Bus.open`."""
+        self.team, self.name = team, name
+        self._session = session
+        self._me = str(session.info.zid())
+        self._inbox: Mailbox[zenoh.Sample] = Mailbox(INBOX)
+        self._oversized: SimpleQueue[None] = SimpleQueue()  # counts what several threads drop
+        self._presence = Presence(self._me)
+        self._declared: dict[str, zenoh.LivelinessToken] = {}
+        self._closed = False
+        tokens, ack = f"{team}/*/*/*", f"{team}/{name}/{RECEIVED}"
+        # Zenoh drops publishers and subscribers nobody refers to.
+        self._declarations: list[Any] = [
+            session.liveliness().declare_subscriber(
+                tokens, _direct(self._note_token), history=True
+            ),
+            session.declare_queryable(ack, _direct(lambda query: query.reply(ack, b""))),
+        ]
+
+    @classmethod
+    def open(
+        cls, bus: BusConfig, team: str, name: str, stopped: Callable[[], bool] | None = None
+    ) -> Self:
+        """Join the network as process `name` of `team`.
+
+        In peer mode the process that drives time listens on `bus.endpoint`; all others connect,
+        now or when it appears, and learn of each other through it, so that links are direct.
+        In client mode the router must be there, or appear within `bus.barrier_timeout` if
+        `stopped` is given; when that takes long this says so on stderr.
+
+        Raises:
+            ConfigError: the endpoint is open to others, or a certificate is missing.
+            BusError: the endpoint is malformed, cannot be bound, or is already in use; or there
+                is no router, or it and this process do not trust each other.
+            KeyboardInterrupt: `stopped()` came before the router.
+        """
+        settings = {**member_settings(bus, name), **tls_of(bus, bus.endpoint, name, listens=False)}
+        begun, logged = monotonic(), False
+        while True:
+            try:
+                check_trust(bus, name)
+                return cls(_open(settings, name), team, name)
+            except BusError as error:
+                waited = monotonic() - begun
+                if stopped is None or NO_LINK not in error.got or waited > bus.barrier_timeout:
+                    raise
+                if stopped():
+                    raise KeyboardInterrupt from None
+                if waited > _QUIET and not logged:
+                    logged = True
+                    text = f"quadriga: {name} waits for a router at {bus.endpoint}"
+                    print(text, file=sys.stderr, flush=True)
+                sleep(POLL)
+
+    @classmethod
+    def join(cls, bus: BusConfig, team: str, name: str) -> Self:
+        """Join the network at `bus.endpoint`; in peer mode be who listens there if nobody does.
+
+        For a process that must be found although no plant runs. If somebody listens there,
+        this waits for the link to them.
+
+        Raises:
+            BusError: the endpoint is malformed, or in client mode there is no router.
+        """
+        if bus.mode == "peer":
+            with suppress(BusError):  # somebody listens there, or it is another machine's
+                settings = member_settings(bus, name, hub=True)
+                return cls(_open(settings, name), team, name)
+        joined = cls.open(bus, team, name)
+        deadline = monotonic() + _LINK_TIMEOUT
+        while not joined.linked and monotonic() < deadline:
+            pause()
+        return joined
+
+    @classmethod
+    def route(
+        cls,
+        listen: str,
+        team: str,
+        bus: BusConfig | None = None,
+        rules: Mapping[str, Any] = MappingProxyType({}),
+    ) -> Self:
+        """Be the router through which the processes in client mode reach each other.
+
+        It passes on what any team sends, and sees the presence of `team`.
+
+        Args:
+            listen: the endpoint they connect to; `tls/0.0.0.0:PORT` accepts other machines.
+            team: the team to look at.
+            bus: the configuration, for its certificates.
+            rules: what it lets through; by default everything.
+
+        Raises:
+            ConfigError: the endpoint is open to others, or a certificate is missing.
+            BusError: the endpoint is malformed, cannot be bound, or is already in use.
+        """
+        bus = bus or BusConfig()
+        settings = router_settings(listen, bus, rules)
+        tls = tls_of(bus, listen, ROUTER, listens=True)
+        return cls(_open({**settings, **tls}, ROUTER), team, ROUTER)
+
+    @property
+    def linked(self) -> bool:
+        """Whether anyone is linked to this process at the moment."""
+        return bool(self._session.info.links())
+
+    def publisher(
+        self, key: str, *, droppable: bool = False, urgent: bool = False
+    ) -> Callable[[bytes], None]:
+        """A function that sends a payload on `key`.
+
+        What is neither waits for whoever is slow, and a router keeps everybody waiting with it.
+
+        Args:
+            key: the full key, `<team>/…`.
+            droppable: when a receiver is slow, drop (real time) instead of waiting for it.
+            urgent: overtake all else and never wait; dropped only where nothing goes through.
+        """
+        control = zenoh.CongestionControl
+        publisher = self._session.declare_publisher(
+            key,
+            express=urgent or not droppable,  # see `_COMMON` of the settings
+            congestion_control=control.DROP if droppable or urgent else control.BLOCK,
+            priority=zenoh.Priority.REAL_TIME if urgent else zenoh.Priority.DATA,
+        )
+        self._declarations.append(publisher)
+        put: Callable[[bytes], None] = publisher.put
+        return put
+
+    def subscribe(self, key: str, *, largest: int = 0) -> None:
+        """Feed what others publish on `key` (may hold `*` and `**`) into the inbox.
+
+        Payloads of more than `largest` bytes (0: any) are dropped as they arrive and counted in
+        `oversized`.
+        """
+
+        def put(sample: zenoh.Sample) -> None:
+            if len(sample.payload) > largest:
+                self._oversized.put(None)
+            else:
+                self._inbox.put(sample)
+
+        self._hear(key, _direct(put if largest else self._inbox.put))
+
+    @property
+    def oversized(self) -> int:
+        """Payloads that were dropped because of their size so far."""
+        return self._oversized.qsize()
+
+    @property
+    def dropped(self) -> int:
+        """Packets that were dropped so far because this process did not take them in."""
+        return self._inbox.dropped
+
+    def collect(self, *keys: str) -> Callable[[], list[Arrival]]:
+        """Keep what others publish on `keys` apart from the inbox, each with when it was received.
+
+        The function returned gives all that have come since it was called last, oldest first.
+        """
+        kept: SimpleQueue[Arrival] = SimpleQueue()
+
+        def keep(sample: zenoh.Sample) -> None:
+            kept.put((monotonic_ns(), str(sample.key_expr), sample.payload.to_bytes()))
+
+        for key in keys:
+            self._hear(key, _direct(keep))
+        return lambda: [kept.get_nowait() for _ in range(kept.qsize())]
+
+    def keep_newest(self, key: str, most: int) -> Newest:
+        """Keep the newest `most` of what others publish on `key`, apart from the inbox.
+
+        Zenoh does that by itself: nobody waits for this process, however rarely it looks.
+        """
+        return Newest(self._hear(key, zenoh.handlers.RingChannel(most)).try_recv)
+
+    def answer(self, key: str, call: Callable[[], bytes]) -> None:
+        """Answer who asks on `key` with `call()`: in the receiving thread, quick, never raising."""
+        self._declarations.append(
+            self._session.declare_queryable(key, _direct(lambda query: query.reply(key, call())))
+        )
+
+    def ask(self, key: str, timeout: float) -> Answers:
+        """Ask all who answer on `key` (may hold `*`) and do not wait for them.
+
+        Answers come for `timeout` seconds at most; who is frozen gives none. This process answers
+        its own question, too.
+        """
+        answers = Answers(wall_ns())
+
+        def note(reply: zenoh.Reply) -> None:
+            if reply.ok is not None:
+                answers.note(wall_ns(), str(reply.ok.key_expr), reply.ok.payload.to_bytes())
+
+        self._session.get(
+            key,
+            zenoh.handlers.Callback(note, answers.end, indirect=False),
+            target=zenoh.QueryTarget.ALL,
+            timeout=timeout,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            express=True,
+            congestion_control=zenoh.CongestionControl.DROP,  # who is frozen holds up nobody
+        )
+        return answers
+
+    def get(self, timeout: float) -> Packet | None:
+        """The oldest packet of the inbox, waiting at most `timeout` seconds for one."""
+        sample = self._inbox.take(timeout)
+        return None if sample is None else _packet(sample)
+
+    def drain(self) -> list[Packet]:
+        """Everything in the inbox, oldest first, without waiting."""
+        return [_packet(sample) for sample in self._inbox.drain()]
+
+    def declare(self, stage: str) -> None:
+        """Tell everyone that this process has reached `stage`; again has no effect."""
+        if stage in self._declared:
+            return
+        key = f"{self.team}/{self.name}/{stage}/{self._me}"
+        self._declared[stage] = self._session.liveliness().declare_token(key)
+
+    def withdraw(self) -> None:
+        """Take back all of this process's tokens: it is about to leave."""
+        while self._declared:
+            self._declared.popitem()[1].undeclare()  # type: ignore[no-untyped-call]
+
+    @property
+    def reached(self) -> frozenset[str]:
+        """The stages that this process has declared."""
+        return frozenset(self._declared)
+
+    def members_at(self, stage: str) -> frozenset[str]:
+        """Names of the other processes that are at `stage` now."""
+        return self._presence.at(stage)
+
+    def duplicates(self, stage: str) -> frozenset[str]:
+        """Names that two processes of the team carry at `stage`, this one's included."""
+        return self._presence.duplicates(stage, [self.name] if stage in self._declared else [])
+
+    def wait_for(
+        self,
+        stage: str,
+        names: Iterable[str],
+        timeout: float,
+        stopped: Callable[[], bool],
+        wait: Callable[[], None] = pause,
+        explain: Callable[[frozenset[str]], str] | None = None,
+    ) -> bool:
+        """Wait until all `names` are at `stage`; False if `stopped()` came first.
+
+        Between two looks `wait()` is called, which takes some milliseconds. `explain()` tells at
+        the end why some are absent.
+
+        Raises:
+            BusError: some were still absent after `timeout` seconds; the message names them.
+        """
+        wanted = frozenset(names) - {self.name}
+        deadline = monotonic() + timeout
+        while absent := wanted - self._presence.at(stage):
+            if stopped():
+                return False
+            if monotonic() > deadline:
+                raise BusError(
+                    f"barrier of team {self.team!r}, seen by {self.name}",
+                    f"no {', '.join(sorted(absent))} at stage {stage!r} after {timeout:g} s",
+                    f"{', '.join(sorted(wanted))}",
+                    explain(absent) if explain else self._likely_cause(),
+                )
+            wait()
+        return True
+
+    def close(self) -> None:
+        """Leave the network once the others have received what this process published.
+
+        Zenoh takes ten seconds to close a session from which a frozen process has yet to read, and
+        then fails. Such a session hears nothing any more, and ends with the process: it closes one
+        that nobody refers to, even when the interpreter ends, so a reference is left for good.
+        """
+        if self._closed:
+            return
+        self._closed = True
+        self.withdraw()
+        if self._flush():
+            self._session.close()  # type: ignore[no-untyped-call]
+        else:
+            for declared in self._declarations:
+                declared.undeclare()
+            ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._session))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _likely_cause(self) -> str:
+        there = "not started, failed to start, or another bus.endpoint or team.name"
+        return there if self.linked else "no link to anyone: is bus.endpoint right and reachable?"
+
+    def _flush(self) -> bool:
+        """Wait until all others have received what was published so far; whether they have.
+
+        Zenoh's close drops what a busy receiver or router has not yet taken. A query travels
+        behind the publications on each link, so its answers say that they have arrived.
+        """
+        asked = self._session.get(
+            f"{self.team}/*/{RECEIVED}",
+            target=zenoh.QueryTarget.ALL,
+            timeout=_ACK_TIMEOUT,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            express=True,
+        )
+        return all(reply.ok is not None for reply in asked)
+
+    def _hear(self, key: str, handler: Any) -> Any:
+        heard = self._session.declare_subscriber(key, handler, allowed_origin=zenoh.Locality.REMOTE)
+        self._declarations.append(heard)
+        return heard
+
+    def _note_token(self, sample: zenoh.Sample) -> None:
+        self._presence.note(str(sample.key_expr), there=sample.kind == zenoh.SampleKind.PUT)
+
+
+def _packet(sample: zenoh.Sample) -> Packet:
+    return str(sample.key_expr), sample.payload.to_bytes()
+
+
+def _direct(call: Callable[[Any], None]) -> Any:
+    """A Zenoh callback in the receiving thread: a mailbox needs no thread of its own."""
+    return zenoh.handlers.Callback(staying_attached(call), indirect=False)
+
+
+def _open(settings: dict[str, Any], name: str) -> zenoh.Session:
+    config, at = zenoh.Config(), ""
+    try:
+        for at, value in settings.items():
+            config.insert_json5(at, json.dumps(value))
+        with nullcontext() if name == ROUTER else one_thread_receives():
+            return zenoh.open(config)
+    except zenoh.ZError as error:
+        raise opening_error(settings, at, name, str(error)) from None

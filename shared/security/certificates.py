@@ -1,0 +1,214 @@
+"""Certificates: what is of interest of one that somebody holds, and what Zenoh is told of it.
+
+The folder of certificates has one folder for each identity, which is all that its machine needs:
+the authority's certificate, its own, and its key.
+
+Imported only where there are certificates: `cryptography` takes 0.1 s.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import Any, Final
+
+from cryptography import x509
+from cryptography.exceptions import InvalidSignature, UnsupportedAlgorithm
+from cryptography.x509.oid import NameOID
+
+from quadriga.shared.errors import ConfigError, name_file_errors
+from quadriga.shared.security.access import identity_of
+
+AUTHORITY: Final = "authority.pem"
+CERTIFICATE: Final = "certificate.pem"
+KEY: Final = "key.pem"
+OTHERS: Final = 0o077  # permissions of a file that others than its owner have
+_TLS: Final = "transport/link/tls"
+
+VALID: Final = "valid"
+NOT_YET_VALID: Final = "not yet valid"
+EXPIRED: Final = "expired"
+
+# What is raised on bytes that are no certificate, or one that nobody can use.
+UNREADABLE: Final = (
+    ValueError,
+    UnsupportedAlgorithm,
+    x509.InvalidVersion,
+    x509.DuplicateExtension,
+    x509.UnsupportedGeneralNameType,
+    TypeError,  # of a name whose text is bits
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Certificate:
+    """A certificate.
+
+    Attributes:
+        name: its common name.
+        hosts: at which its owner listens.
+        begins: from when on it is valid.
+        expires: when it is not valid any more.
+    """
+
+    name: str
+    hosts: tuple[str, ...]
+    begins: datetime
+    expires: datetime
+
+    def days_left(self, now: datetime) -> float:
+        """Until it expires; negative afterwards."""
+        return (self.expires - now) / timedelta(days=1)
+
+    def state(self, now: datetime) -> str:
+        """`VALID`, `NOT_YET_VALID` or `EXPIRED`."""
+        if now < self.begins:
+            return NOT_YET_VALID
+        return VALID if now < self.expires else EXPIRED
+
+
+def read_certificate(path: Path) -> Certificate:
+    """A certificate from its file.
+
+    Raises:
+        ConfigError: it cannot be read, or is none.
+    """
+    found = _load(path)
+    try:
+        with _without_warnings():
+            names = found.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
+            hosts = _hosts_of(found)
+    except UNREADABLE as error:
+        raise _damaged(path, str(error)) from None
+    name = str(names[0].value) if names else ""
+    return Certificate(name, hosts, found.not_valid_before_utc, found.not_valid_after_utc)
+
+
+def is_signed(path: Path, authority: Path) -> bool:
+    """Whether the certificate in one file is signed by the owner of that in another.
+
+    Raises:
+        ConfigError: one cannot be read, or is none.
+    """
+    try:
+        _load(path).verify_directly_issued_by(_load(authority))
+    except (*UNREADABLE, InvalidSignature):  # another name, another key
+        return False
+    return True
+
+
+def load_certificate(text: bytes) -> x509.Certificate:
+    """A certificate of a PEM text.
+
+    Raises:
+        one of UNREADABLE: it is none.
+    """
+    with _without_warnings():
+        return x509.load_pem_x509_certificate(text)
+
+
+def _load(path: Path) -> x509.Certificate:
+    with name_file_errors(ConfigError, path, "a certificate", "`quadriga certs make` makes it"):
+        text = path.read_bytes()
+    try:
+        return load_certificate(text)
+    except UNREADABLE as error:
+        raise _damaged(path, describe_pem_error(text, error)) from None
+
+
+@contextmanager
+def _without_warnings() -> Iterator[None]:
+    """Say nothing of what is unusual in a certificate that can be read all the same."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield
+
+
+def describe_pem_error(text: bytes, error: Exception) -> str:
+    """What is wrong with a PEM file; the library's words are about itself where there is no PEM."""
+    if b"-----BEGIN " in text:
+        return str(error)
+    return "text that is not PEM" if text.strip() else "an empty file"
+
+
+def _damaged(path: Path, got: str) -> ConfigError:
+    return ConfigError(str(path), got[:200], "a certificate", "damaged? `quadriga certs renew`")
+
+
+def _hosts_of(found: x509.Certificate) -> tuple[str, ...]:
+    try:
+        names = found.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
+    except x509.ExtensionNotFound:
+        return ()
+    return tuple(str(name.value) for name in names)
+
+
+@dataclass(frozen=True, slots=True)
+class TlsFiles:
+    """What one process shows and trusts.
+
+    Attributes:
+        authority: certificate of who signs the team's.
+        certificate: the process's own.
+        key: its private key.
+    """
+
+    authority: Path
+    certificate: Path
+    key: Path
+
+    @classmethod
+    def within(cls, folder: Path) -> TlsFiles:
+        """Those in the folder of one identity."""
+        return cls(folder / AUTHORITY, folder / CERTIFICATE, folder / KEY)
+
+
+def tls_files(certificates: str, process: str) -> TlsFiles:
+    """The files of a process.
+
+    Args:
+        certificates: the folder of the configuration.
+        process: its name on the bus.
+
+    Raises:
+        ConfigError: one is missing or empty, others may read the key, or the certificate is
+            somebody else's.
+    """
+    identity = identity_of(process)
+    files = TlsFiles.within(Path(certificates).absolute() / identity)
+    copy = f"copy the folder {identity} to this machine"
+    for path in (files.authority, files.certificate, files.key):
+        if not path.is_file() or not path.stat().st_size:
+            got = "an empty file" if path.is_file() else "no such file"
+            cause = f"`quadriga certs make` makes it; {copy}"
+            raise ConfigError(str(path), got, f"the certificates of {identity}", cause)
+    if files.key.stat().st_mode & OTHERS:
+        mode = f"mode {files.key.stat().st_mode & 0o777:o}"
+        raise ConfigError(str(files.key), mode, "600", "others may read this private key")
+    name = read_certificate(files.certificate).name
+    if name != identity:  # the router would silently deny what it says
+        got, cause = f"the certificate of {name!r}", f"copied under another name? {copy}"
+        raise ConfigError(str(files.certificate), got, f"that of {identity}", cause)
+    return files
+
+
+def tls_settings(files: TlsFiles, *, listens: bool) -> Mapping[str, Any]:
+    """Zenoh's settings of who listens with these files, or of who connects.
+
+    Each shows its certificate and trusts only those of the authority. Who connects also expects
+    the address that it asked for in the listener's certificate.
+    """
+    side = "listen" if listens else "connect"
+    return {
+        "transport/link/protocols": ["tls"],
+        f"{_TLS}/root_ca_certificate": str(files.authority),
+        f"{_TLS}/{side}_certificate": str(files.certificate),
+        f"{_TLS}/{side}_private_key": str(files.key),
+        f"{_TLS}/enable_mtls": True,
+        f"{_TLS}/verify_name_on_connect": True,
+        f"{_TLS}/close_link_on_expiration": True,
+    }

@@ -1,0 +1,161 @@
+"""Through a router with certificates a team walks, and nobody sends or hears what is not his."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import zenoh
+
+from quadriga.certs.folder import CertificateFolder
+from quadriga.doctor.examine import examine
+from quadriga.shared.bus.session import HERE, Bus
+from quadriga.shared.errors import BusError, ConfigError
+from quadriga.shared.security.access import largest
+from quadriga.shared.security.certificates import TlsFiles, tls_files
+from quadriga.shared.wire.topics import COMMAND
+from tests.runtime.conftest import Make, Team
+from tests.runtime.fortress import LONG_AGO, NOW, WAIT, Fortress, make_fortress, serving, stranger
+from tests.runtime.test_lockstep import payloads
+
+LAST = b"last"  # what comes in last over a link: the rest has come in before, or was refused
+FOREIGN = (  # whose certificate was stolen, and a key that is not its owner's
+    ("r2", "team/r1/command"),
+    ("r2", "team/r1/state"),
+    ("r2", "team/sim/event"),
+    ("operator", "team/r1/command"),
+    ("sim", "team/r1/command"),
+    ("r1", "team/reference"),
+    ("r1", "team/r2/plan"),
+    ("r1", "team/of/strangers"),
+    ("r1", "other/r1/command"),
+    ("recorder", "team/estop"),
+)
+
+
+@pytest.fixture(scope="module")
+def fortress(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Fortress]:
+    """A team of two, whose router serves."""
+    made = make_fortress(tmp_path_factory.mktemp("fortress"))
+    with serving(made):
+        yield made
+
+
+@pytest.fixture
+def recorder(fortress: Fortress) -> Iterator[Bus]:
+    """Hears all that the router lets through."""
+    with fortress.bus("recorder") as bus:
+        bus.subscribe("team/**")
+        yield bus
+
+
+def heard(fortress: Fortress, recorder: Bus, session: zenoh.Session | None = None) -> set[str]:
+    """The keys of all that has been let through until now."""
+    if session is not None:  # its own question arrives behind what it has sent
+        for _ in session.get("team/recorder/received", timeout=WAIT):
+            pass
+    with fortress.bus("estop") as bus:
+        bus.publisher("team/estop")(LAST)
+        keys = set[str]()
+        while (packet := recorder.get(WAIT)) != ("team/estop", LAST):
+            assert packet, "the last word never came"
+            keys.add(packet[0])
+    return keys
+
+
+def test_the_same_walk_as_without_a_router(make_team: Make, tmp_path: Path) -> None:
+    direct = make_team(recorder__enabled=True, world__seconds=0.5)
+    expected = payloads(direct.run())
+    folder = tmp_path / "secure"
+    folder.mkdir()
+    own = make_fortress(folder)
+    team = Team(replace(direct.config, bus=replace(own.config.bus, barrier_timeout=60)), folder)
+    with serving(own):
+        assert payloads(team.run()) == expected
+
+
+@pytest.mark.parametrize(("thief", "key"), FOREIGN)
+def test_a_foreign_key_is_refused(fortress: Fortress, recorder: Bus, thief: str, key: str) -> None:
+    with stranger(fortress, fortress.files(thief)) as session:
+        for _ in range(20):
+            session.put(key, bytes(50), congestion_control=zenoh.CongestionControl.BLOCK)
+        assert heard(fortress, recorder, session) == set()
+
+
+def test_who_is_let_in_hears_what_is_its_own_alone(fortress: Fortress, recorder: Bus) -> None:
+    with fortress.bus("sim") as sim, stranger(fortress, fortress.files("r2")) as session:
+        stolen = [session.declare_subscriber(key) for key in ("**", "team/**", "team/*/state")]
+        own = session.declare_subscriber("team/r2/state")
+        states = [sim.publisher(f"team/{name}/state") for name in ("r1", "r2")]
+        while "team/r2/state" not in heard(fortress, recorder, session):
+            for put in states:
+                put(bytes(50))
+        assert str(own.recv().key_expr) == "team/r2/state"
+        samples = [sample for each in stolen for sample in iter(each.try_recv, None)]
+        assert {str(sample.key_expr) for sample in samples} <= {"team/r2/state"}
+
+
+def test_a_message_larger_than_any_of_its_type_stops_at_the_router(
+    fortress: Fortress, recorder: Bus
+) -> None:
+    with stranger(fortress, fortress.files("r2")) as session:
+        session.put("team/r2/command", bytes(largest(COMMAND.type) + 1))
+        assert heard(fortress, recorder, session) == set()
+        session.put("team/r2/command", bytes(50))
+        assert heard(fortress, recorder, session) == {"team/r2/command"}
+
+
+def test_forged_presence_is_seen_by_nobody(fortress: Fortress, recorder: Bus) -> None:
+    with stranger(fortress, fortress.files("r2")) as session:
+        tokens = [
+            session.liveliness().declare_token(f"team/{name}/{HERE}/{session.info.zid()}")
+            for name in ("sim", "planner", "r2")
+        ]
+        assert recorder.wait_for(HERE, ["r2"], WAIT, lambda: False)
+        assert recorder.members_at(HERE) == {"r2"}
+        for token in tokens:
+            token.undeclare()  # type: ignore[no-untyped-call]
+
+
+def theirs(fortress: Fortress, folder: Path) -> TlsFiles:
+    """r1's files, by another team's authority."""
+    CertificateFolder(folder, ("r1",)).make("team", (), NOW, 1.0)
+    files = tls_files(str(folder), "r1")
+    files.authority.write_bytes(fortress.files("r1").authority.read_bytes())
+    return files
+
+
+@pytest.mark.parametrize("case", ["none", "another team's", "expired"])
+def test_without_a_certificate_of_the_team_nobody_comes_in(
+    fortress: Fortress, recorder: Bus, tmp_path: Path, case: str
+) -> None:
+    bus, files = fortress.config.bus, None
+    if case == "another team's":
+        files = theirs(fortress, tmp_path)
+        bus = replace(bus, certificates=str(tmp_path))
+    if case == "expired":
+        folder = CertificateFolder(tmp_path, ("r1",))
+        for name in ("authority.pem", "authority.key"):
+            (tmp_path / name).write_bytes((Path(bus.certificates) / name).read_bytes())
+        folder.make("team", (), LONG_AGO, 1.0)
+        files = tls_files(str(tmp_path), "r1")
+        bus = replace(bus, certificates=str(tmp_path))
+    with suppress(zenoh.ZError), stranger(fortress, files) as session:
+        for key in ("team/r1/command", "team/estop"):
+            session.put(key, bytes(50))
+    assert heard(fortress, recorder) == set()
+    if files is not None:
+        with pytest.raises(BusError, match=r"refused: .*`quadriga certs show`"):
+            Bus.open(bus, "team", "r1")
+        report = examine(replace(fortress.config, bus=bus), here=False)
+        (found,) = [m.diagnoses for m in report.members or () if m.name == "r1"]
+        told = "expired" if case == "expired" else "not-trusted"
+        assert told in {item.code for item in found}
+
+
+def test_who_has_no_certificate_does_not_even_try(fortress: Fortress) -> None:
+    with pytest.raises(ConfigError, match=r"player/authority\.pem: got no such file"):
+        fortress.bus("player")

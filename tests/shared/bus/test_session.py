@@ -1,0 +1,346 @@
+"""Real Zenoh over loopback: links, order, presence, and the errors of a network."""
+
+from __future__ import annotations
+
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+
+import pytest
+
+from quadriga.shared.bus import session
+from quadriga.shared.bus.session import HERE, READY, Bus
+from quadriga.shared.config.sections import BusConfig
+from quadriga.shared.errors import BusError, ConfigError
+from quadriga.shared.runtime.clock import monotonic, monotonic_ns
+from quadriga.team.endpoint import free_endpoint
+
+WAIT = 10.0  # s, far more than anything here takes
+GRACE = 5.0  # s, that the launcher gives a process to leave
+Open = Callable[..., Bus]
+
+
+def never() -> bool:
+    return False
+
+
+@pytest.fixture
+def endpoint() -> str:
+    return free_endpoint()
+
+
+@pytest.fixture
+def opened(endpoint: str) -> Iterator[Open]:
+    """A function that opens a bus, by name, on the test's own endpoint; all are closed at last."""
+    with ExitStack() as stack:
+
+        def open_bus(name: str, team: str = "team", mode: str = "peer") -> Bus:
+            config = BusConfig(mode=mode, endpoint=endpoint, plaintext=True)
+            return stack.enter_context(Bus.open(config, team, name))
+
+        yield open_bus
+
+
+def meet(*buses: Bus) -> None:
+    """Everyone here and seen by everyone."""
+    for bus in buses:
+        bus.declare(HERE)
+    for bus in buses:
+        assert bus.wait_for(HERE, {other.name for other in buses}, WAIT, never)
+
+
+def numbers(bus: Bus, count: int) -> list[int]:
+    """The next `count` payloads as numbers."""
+    packets = [bus.get(WAIT) for _ in range(count)]
+    return [int(packet[1]) for packet in packets if packet]
+
+
+def test_everyone_reaches_everyone_though_all_know_only_the_sim_server(opened: Open) -> None:
+    r1, r2 = opened("r1"), opened("r2")  # before the sim server
+    sim = opened("sim")
+    for bus in (sim, r1, r2):
+        bus.subscribe("team/*/x")
+    meet(sim, r1, r2)
+    put = r1.publisher("team/r1/x")
+    for k in range(200):
+        put(b"%d" % k)
+    assert numbers(r2, 200) == numbers(sim, 200) == list(range(200))
+    assert r1.get(0.05) is None  # nobody hears himself
+
+
+def test_a_key_tells_who_sent_what(opened: Open) -> None:
+    sim, r1 = opened("sim"), opened("r1")
+    sim.subscribe("team/**")
+    meet(sim, r1)
+    r1.publisher("team/r1/x")(b"\x00\xff")
+    assert sim.get(WAIT) == ("team/r1/x", b"\x00\xff")
+    r1.publisher("team/r1/y", droppable=True)(b"")
+    r1.publisher("team/z")(b"2")
+    assert sim.get(WAIT) == ("team/r1/y", b"")
+    assert sim.get(WAIT) == ("team/z", b"2")
+    assert sim.drain() == []
+
+
+def test_get_waits_no_longer_than_told(opened: Open) -> None:
+    sim = opened("sim")
+    begun = monotonic()
+    assert sim.get(0.05) is None
+    assert 0.04 < monotonic() - begun < 1.0
+
+
+def test_what_is_collected_is_apart_from_the_inbox_and_has_the_time_it_arrived(
+    opened: Open,
+) -> None:
+    sim, r1 = opened("sim"), opened("r1")
+    collected, put = r1.collect("team/clock"), sim.publisher("team/clock")
+    r1.subscribe("team/other")
+    other = sim.publisher("team/other")
+    meet(sim, r1)
+    sent = monotonic_ns()
+    for number in range(3):
+        put(b"%d" % number)
+    other(b"9")
+    assert numbers(r1, 1) == [9]
+    arrivals, looked = collected(), monotonic_ns()
+    assert [(key, payload) for _, key, payload in arrivals] == [
+        ("team/clock", b"%d" % number) for number in range(3)
+    ]
+    times = [at for at, _, _ in arrivals]
+    assert [sent, *times, looked] == sorted([sent, *times, looked])
+    assert collected() == []
+
+
+def test_what_was_sent_before_closing_arrives(opened: Open) -> None:
+    sim, r1 = opened("sim"), opened("r1")
+    sim.subscribe("team/**")
+    meet(sim, r1)
+    put = r1.publisher("team/r1/x")
+    for k in range(5000):
+        put(b"%d" % k)
+    r1.close()
+    assert numbers(sim, 5000) == list(range(5000))
+
+
+FROZEN = """
+import sys
+from quadriga.shared.bus.session import HERE, Bus
+from quadriga.shared.config.sections import BusConfig
+with Bus.open(BusConfig(endpoint=sys.argv[1]), "team", "r1") as bus:
+    bus.subscribe("team/**")
+    bus.declare(HERE)
+    while True:
+        bus.get(1.0)
+"""
+
+
+LEAVES = """
+import sys
+from quadriga.shared.bus.session import HERE, Bus
+from quadriga.shared.config.sections import BusConfig
+with Bus.open(BusConfig(endpoint=sys.argv[1]), "team", "sim") as bus:
+    bus.declare(HERE)
+    bus.wait_for(HERE, {"r1", "r2"}, 10.0, lambda: False)
+    print(flush=True)
+    input()
+    put = bus.publisher("team/sim/x")
+    for k in range(2000):
+        put(b"%500d" % k)
+"""
+
+
+def test_who_is_frozen_keeps_nobody_from_leaving(opened: Open, endpoint: str) -> None:
+    """Zenoh fails to close a session from which a frozen process has yet to read this much."""
+    r2 = opened("r2")
+    r2.subscribe("team/**")
+    r2.declare(HERE)
+    pipe, python = subprocess.PIPE, (sys.executable, "-c")
+    with (
+        subprocess.Popen([*python, LEAVES, endpoint], stdin=pipe, stdout=pipe, stderr=pipe) as sim,
+        subprocess.Popen([*python, FROZEN, endpoint]) as r1,
+    ):
+        try:
+            assert sim.stdout is not None
+            assert sim.stdout.readline() == b"\n"
+            r1.send_signal(signal.SIGSTOP)
+            outputs = sim.communicate(b"\n", WAIT)
+        finally:
+            r1.kill()
+            sim.kill()
+    assert (sim.returncode, *outputs) == (0, b"", b"")
+    assert numbers(r2, 2000) == list(range(2000))
+
+
+def leaves_in_time(bus: Bus) -> bool:
+    """Whether closing a bus takes less than a process has once it is told to leave."""
+    begun = monotonic()
+    bus.close()
+    return monotonic() - begun < GRACE
+
+
+def test_who_accepts_and_says_nothing_keeps_nobody_from_leaving() -> None:
+    """Zenoh tries to shake hands for ten seconds, and until then closes no session."""
+    with socket.create_server(("127.0.0.1", 0)) as mute:
+        config = BusConfig(endpoint=f"tcp/127.0.0.1:{mute.getsockname()[1]}")
+        r1 = Bus.open(config, "team", "r1")
+        with mute.accept()[0]:
+            assert leaves_in_time(r1)
+
+
+def test_who_calls_and_says_nothing_keeps_nobody_from_leaving(opened: Open, endpoint: str) -> None:
+    sim, address = opened("sim"), endpoint.removeprefix("tcp/").split(":")
+    with socket.create_connection((address[0], int(address[1]))):
+        meet(sim, opened("r1"))  # who calls later is heard later
+        assert leaves_in_time(sim)
+
+
+def test_presence_comes_and_goes_by_stage(opened: Open) -> None:
+    sim, r1 = opened("sim"), opened("r1")
+    meet(sim, r1)
+    assert sim.members_at(READY) == frozenset()
+    r1.declare(READY)
+    assert sim.wait_for(READY, {"r1"}, WAIT, never)
+    assert sim.members_at(HERE) == {"r1"}
+    r1.close()
+    deadline = monotonic() + WAIT
+    while sim.members_at(HERE) and monotonic() < deadline:
+        sim.get(0.01)
+    assert sim.members_at(HERE) == sim.members_at(READY) == frozenset()
+
+
+def test_a_barrier_names_the_absent(opened: Open) -> None:
+    sim, r1 = opened("sim"), opened("r1")
+    r1.declare(HERE)
+    with pytest.raises(BusError, match=r"no r2, recorder at stage 'here' after 0\.5 s"):
+        sim.wait_for(HERE, {"r1", "r2", "recorder"}, 0.5, never)
+
+
+def test_a_barrier_without_a_link_says_so(opened: Open) -> None:
+    with pytest.raises(BusError, match=r"no sim at .*is bus\.endpoint right and reachable"):
+        opened("r1").wait_for(HERE, {"sim"}, 0.1, never)
+
+
+def test_a_barrier_can_be_left(opened: Open) -> None:
+    assert not opened("r1").wait_for(HERE, {"sim"}, WAIT, lambda: True)
+
+
+def test_two_processes_of_one_name_are_noticed(opened: Open) -> None:
+    sim, first, second = opened("sim"), opened("r1"), opened("r1")
+    meet(sim, first)
+    assert sim.duplicates(HERE) == frozenset()
+    second.declare(HERE)
+    deadline = monotonic() + WAIT
+    while not (sim.duplicates(HERE) and first.duplicates(HERE)) and monotonic() < deadline:
+        sim.get(0.01)
+    assert sim.duplicates(HERE) == first.duplicates(HERE) == {"r1"}
+
+
+def test_who_joins_is_found_without_a_sim_server_and_steps_back_for_one_who_listens(
+    opened: Open, endpoint: str
+) -> None:
+    config = BusConfig(endpoint=endpoint)
+    early = opened("r1")
+    with Bus.join(config, "team", "first") as first, Bus.join(config, "team", "second") as second:
+        early.subscribe("team/*/x")
+        meet(early, first, second)
+        second.publisher("team/r2/x")(b"7")
+        assert numbers(early, 1) == [7]
+        with pytest.raises(BusError, match="another team or program listens there"):
+            opened("sim")
+    with pytest.raises(BusError, match="no router there"):
+        Bus.join(BusConfig(mode="client", endpoint=endpoint), "team", "third")
+
+
+def test_a_port_in_use_is_one_clear_error(opened: Open, endpoint: str) -> None:
+    opened("sim")
+    with pytest.raises(BusError, match=rf"{endpoint}.*Address already in use.*another team"):
+        opened("sim", team="other")
+
+
+@pytest.mark.parametrize(
+    ("endpoint", "cause"),
+    [
+        ("tcp/203.0.113.1:7447", "no interface of this machine"),
+        ("carrier-pigeon/roof:1", "not of the form tcp/HOST:PORT"),
+        ("", "not of the form tcp/HOST:PORT"),
+    ],
+)
+def test_an_endpoint_that_cannot_be_opened(opened: Open, cause: str) -> None:
+    with pytest.raises(BusError, match=cause):
+        opened("sim")
+
+
+@pytest.mark.parametrize(
+    ("listen", "cause"),
+    [
+        ("tcp/203.0.113.1:0", "no interface of this machine"),
+        ("tcp/127.0.0.1:x", "not of the form tcp/HOST:PORT"),
+        ("tcp/no host:0", "a name that does not resolve"),
+        ("carrier-pigeon/roof:1", "not of the form tcp/HOST:PORT"),
+        ("", "not of the form tcp/HOST:PORT"),
+    ],
+)
+def test_where_a_process_listens_is_not_where_it_connects(
+    endpoint: str, listen: str, cause: str
+) -> None:
+    config = BusConfig(endpoint=endpoint, listen=listen, plaintext=True)
+    with pytest.raises(BusError, match=rf"^bus\.listen '{listen}' of r1: .*{cause}"):
+        Bus.open(config, "team", "r1")
+
+
+@pytest.mark.parametrize("endpoint", ["carrier-pigeon/roof:1", "tcp", ""])
+def test_where_a_process_connects_is_not_where_it_listens(endpoint: str) -> None:
+    with pytest.raises(BusError, match=rf"^bus\.endpoint '{endpoint}' of r1: "):
+        Bus.open(BusConfig(endpoint=endpoint), "team", "r1")
+
+
+@pytest.mark.parametrize(
+    ("name", "config"),
+    [
+        ("endpoint", BusConfig(endpoint="tcp/203.0.113.1:1")),
+        ("listen", BusConfig(listen="tcp/0.0.0.0:0")),
+    ],
+)
+def test_nobody_is_reached_from_other_machines_unasked(name: str, config: BusConfig) -> None:
+    with pytest.raises(ConfigError, match=rf"bus\.{name}: got .*bus\.plaintext = true"):
+        Bus.open(config, "team", "r1")
+    with pytest.raises(ConfigError, match="--listen: got"):
+        Bus.route("tcp/0.0.0.0:7447", "team")
+
+
+def test_without_a_router_a_client_cannot_start(opened: Open) -> None:
+    with pytest.raises(BusError, match="no router there"):
+        opened("r1", mode="client")
+
+
+def test_who_waits_for_a_router_says_so_once(
+    endpoint: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(session, "_QUIET", 0.0)
+    looks = iter([False, False, False, True])
+    config = BusConfig(mode="client", endpoint=endpoint)
+    with pytest.raises(KeyboardInterrupt):
+        Bus.open(config, "team", "r1", lambda: next(looks))
+    assert capsys.readouterr().err == f"quadriga: r1 waits for a router at {endpoint}\n"
+
+
+def test_two_teams_at_one_router_do_not_mix(opened: Open, endpoint: str) -> None:
+    with Bus.route(endpoint, "a"):
+        teams = []
+        for team in ("a", "b"):
+            sim, r1 = (opened(name, team=team, mode="client") for name in ("sim", "r1"))
+            sim.subscribe(f"{team}/**")
+            teams.append((team, sim, r1))
+        for team, sim, r1 in teams:
+            meet(sim, r1)
+            r1.publisher(f"{team}/r1/x")(team.encode())
+        for team, sim, _ in teams:
+            assert sim.get(WAIT) == (f"{team}/r1/x", team.encode())
+            assert sim.get(0.1) is None
+            assert sim.members_at(HERE) == {"r1"}
+            assert not sim.duplicates(HERE)
+        for _, sim, r1 in teams:
+            r1.close()
+            sim.close()

@@ -1,0 +1,162 @@
+"""What is left of a damaged recording: a part of the original, never anything else."""
+
+from __future__ import annotations
+
+import re
+import zlib
+from collections import Counter
+from contextlib import suppress
+from pathlib import Path
+
+import lz4.frame
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mcap.data_stream import RecordBuilder
+from mcap.records import Chunk
+
+from quadriga.shared.errors import RecordingError
+from quadriga.shared.recording.reader import (
+    CORRUPT,
+    LARGEST_CHUNK,
+    RECORD,
+    ChunkEntry,
+    Recording,
+    content_of,
+)
+from quadriga.shared.recording.recover import DamagedRecording
+from quadriga.shared.recording.writer import RecordingWriter
+from quadriga.shared.wire.codec import encode
+from quadriga.shared.wire.messages import Reference
+from tests.shared.recording.test_reader import METADATA, command, state
+
+KEYS = ("team/r1/state", "team/r1/command", "team/r2/state", "team/reference")
+
+
+@pytest.fixture(scope="module")
+def original(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A small whole recording of some twenty chunks."""
+    path = tmp_path_factory.mktemp("original") / "run.mcap"
+    with RecordingWriter(path, METADATA, chunk_kib=16) as writer:
+        for tick in range(250):
+            for key in KEYS:
+                message = state(tick) if "state" in key else command(tick)
+                if key == KEYS[-1]:
+                    payload = encode(Reference(tick, tick, 0.1 * tick, 0.0, 0.0, 0.26))
+                else:
+                    payload = encode(message)
+                writer.write(key, payload, 1_000 * tick)
+    return path
+
+
+def entries_of(path: Path) -> list[ChunkEntry]:
+    return list(Recording(path).entries())
+
+
+def damaged(original: Path, content: bytes) -> Path:
+    path = original.with_name("damaged.mcap")
+    path.write_bytes(content)
+    return path
+
+
+def test_a_whole_file_comes_back_without_damage(original: Path) -> None:
+    salvage = DamagedRecording(original)
+    assert list(salvage.entries()) == entries_of(original)
+    assert (salvage.damages, salvage.metadata) == ([], METADATA)
+    assert salvage.notes["quadriga.counts"]["messages"] == "1000"
+    Recording(original).require_whole()
+
+
+@settings(max_examples=80)
+@given(data=st.data())
+def test_whatever_happened_to_it_the_rest_is_as_it_was(original: Path, data: st.DataObject) -> None:
+    whole = original.read_bytes()
+    content = bytearray(whole)
+    flips = data.draw(st.integers(0, 4), label="flips")
+    for _ in range(flips):
+        at = data.draw(st.integers(0, len(whole) - 1), label="byte")
+        content[at] ^= 1 << data.draw(st.integers(0, 7), label="bit")
+    if data.draw(st.booleans(), label="cut"):
+        del content[data.draw(st.integers(0, len(whole)), label="length") :]
+    path = damaged(original, bytes(content))
+    if bytes(content) == whole:
+        Recording(path).require_whole()
+        return
+    with pytest.raises(RecordingError):
+        Recording(path).require_whole()
+    try:
+        salvage = DamagedRecording(path)
+    except RecordingError:
+        assert len(content) < 3000 or b"quadriga" not in content[:64]
+        return
+    assert salvage.metadata in ({}, METADATA)
+    before, found = entries_of(original), list(salvage.entries())
+    assert not Counter(found) - Counter(before)
+    if len(content) == len(whole):
+        assert len(before) - len(found) <= flips * 60  # each costs the chunk it hit, no more
+    with suppress(RecordingError):
+        assert not Counter(Recording(path).entries()) - Counter(before)
+
+
+def test_a_bad_chunk_is_named_and_skipped(original: Path) -> None:
+    content = bytearray(original.read_bytes())
+    chunks = [found.end() for found in re.finditer(rb"\x03\0\0\0lz4", content)]
+    at = chunks[1] + 100  # among the messages of the second chunk; the last ones are its index
+    content[at] ^= 1
+    salvage = DamagedRecording(damaged(original, bytes(content)))
+    found = list(salvage.entries())
+    assert 900 < len(found) < 1000
+    assert found[-1] == entries_of(original)[-1]
+    (damage,) = salvage.damages
+    assert damage.what == "a chunk that fails its checksum"
+    assert damage.at <= at < damage.at + damage.size
+    assert damage.log_times is not None
+    lost = {e.log_time_ns for e in entries_of(original)} - {e.log_time_ns for e in found}
+    assert min(lost) >= damage.log_times[0]
+    assert max(lost) <= damage.log_times[1]
+
+
+def test_the_metadata_s_copy_stands_in(original: Path) -> None:
+    content = bytearray(original.read_bytes())
+    content[content.index(b"config_sha256") + 20] ^= 1
+    path = damaged(original, bytes(content))
+    with pytest.raises(RecordingError, match="metadata that fail their checksum"):
+        Recording(path)
+    assert DamagedRecording(path).metadata == METADATA
+
+
+def test_what_is_no_recording_is_refused(original: Path, tmp_path: Path) -> None:
+    whole = original.read_bytes()
+    files = {
+        "empty": b"",
+        "text": b"PK\x03\x04 a zip" * 100,
+        "magic": whole[:8],
+        "foreign": whole.replace(b"quadriga", b"somebody").replace(b"team/", b"band_"),
+    }
+    for name, content in files.items():
+        path = tmp_path / f"{name}.mcap"
+        path.write_bytes(content)
+        with pytest.raises(RecordingError):
+            DamagedRecording(path)
+        with pytest.raises(RecordingError):
+            Recording(path)
+    with pytest.raises(RecordingError, match="No such file"):
+        DamagedRecording(tmp_path / "no.mcap")
+
+
+def test_no_more_is_unpacked_than_a_chunk_states() -> None:
+    """A bomb: much of nothing in a few bytes."""
+
+    def record(content: bytes, size: int) -> bytes:
+        packed = lz4.frame.compress(content)
+        builder = RecordBuilder()
+        Chunk("lz4", packed, 0, 0, zlib.crc32(content), size).write(builder)
+        return bytes(builder.end())[RECORD.size :]
+
+    bomb = bytes(1_000_000)
+    assert content_of(record(bomb, 1_000_000)) == bomb
+    for size in (0, 1000, 999_999, 1_000_001, 1 << 40, (1 << 63) - 1):
+        with pytest.raises(CORRUPT):
+            content_of(record(bomb, size))
+    with pytest.raises(CORRUPT):
+        content_of(record(bytes(LARGEST_CHUNK + 1), LARGEST_CHUNK + 1))

@@ -1,0 +1,97 @@
+"""Ticks of one key: what is missing between them, and what was never sent."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from quadriga.shared.config.load import load
+from quadriga.shared.recording.ticks import SkippedTicks, TickTrack
+from quadriga.shared.wire.codec import encode
+from quadriga.shared.wire.messages import Consumed
+
+
+@given(
+    period=st.integers(1, 50), start=st.integers(0, 1000), count=st.integers(2, 60), data=st.data()
+)
+def test_every_missing_message_is_counted(
+    period: int, start: int, count: int, data: st.DataObject
+) -> None:
+    every = [start + period * k for k in range(count)]
+    gone = data.draw(st.sets(st.sampled_from(every[1:-1]))) if count > 2 else set()
+    track = TickTrack(period)
+    for tick in every:
+        if tick not in gone:
+            track.note(tick)
+    assert track.lost == len(gone)
+    assert (track.first, track.last, track.count) == (every[0], every[-1], count - len(gone))
+    missing = sum((after - before) // period - 1 for before, after in track.gaps)
+    assert missing == len(gone)
+
+
+def test_what_is_no_gap() -> None:
+    track = TickTrack(10)
+    for tick in (-1, 50, 50, 60, 63, -1, 70, 9_000_000_000, 0, 10):
+        track.note(tick)
+    assert (track.lost, track.gaps, track.count, track.first) == (0, [], 10, 50)
+    unknown = TickTrack(0)
+    for tick in (5, 500):
+        unknown.note(tick)
+    assert unknown.lost == 0
+
+
+@pytest.mark.parametrize("odd", [0, 400, 1099, 5_000_000])
+def test_one_message_out_of_order_is_no_gap(odd: int) -> None:
+    track = TickTrack(1)
+    for tick in (*range(1100), odd, *range(1100, 1200), *range(1240, 1300)):
+        track.note(tick)
+    assert (track.lost, track.gaps, track.last) == (40, [(1199, 1240)], 1299)
+
+
+def test_a_long_loss_is_one() -> None:
+    track = TickTrack(10)
+    for tick in (*range(0, 1000, 10), *range(60_000, 60_100, 10)):
+        track.note(tick)
+    assert (track.lost, track.gaps) == (5900, [(990, 60_000)])
+
+
+def test_a_file_goes_on_where_the_one_before_ended() -> None:
+    track = TickTrack(10, before=90)
+    track.note(120)
+    assert (track.lost, track.gaps, track.first) == (2, [(90, 120)], 120)
+
+
+def test_what_was_never_sent_is_not_lost() -> None:
+    track = TickTrack(1)
+    for tick in (0, 4, 7):
+        track.note(tick)
+    assert track.lost == 5
+    track.skip(3)
+    assert track.lost == 2
+    track.skip(1 << 40)
+    assert track.lost == 0
+
+
+def consumed(passed: int) -> bytes:
+    return encode(Consumed(53, 0, 0, passed, (), ()))
+
+
+def test_an_agent_says_how_many_ticks_it_skipped() -> None:
+    found = SkippedTicks(load(None, {"team.robots": 2, "world.mode": "realtime"}))
+    assert found.find("team/r2/inputs", consumed(3)) == ("team/r2/command", 3)
+
+
+@pytest.mark.parametrize(
+    ("mode", "key", "payload"),
+    [
+        ("realtime", "team/r2/inputs", consumed(0)),
+        ("realtime", "team/r2/inputs", b"\xc1"),
+        ("realtime", "team/r3/inputs", consumed(3)),
+        ("realtime", "team/r2/status", consumed(3)),
+        ("lockstep", "team/r2/inputs", consumed(3)),
+    ],
+)
+def test_all_else_says_nothing_about_it(mode: str, key: str, payload: bytes) -> None:
+    found = SkippedTicks(load(None, {"team.robots": 2, "world.mode": mode}))
+    assert found.find(key, payload) is None
