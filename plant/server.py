@@ -180,7 +180,7 @@ class PlantServer:
         """Why a robot is given up, and what was wrong with its latest command if something was."""
         if refused := self.commands.why_refused(robot):
             why += f", its last command was refused ({refused})"
-        return why
+        return why + self.bus.standstill.note
 
     def publish_status(self, status: Status) -> None:
         """Publish the plant's report on itself."""

@@ -17,6 +17,7 @@ from quadriga.shared.bus.endpoint import check_trust, tls_of
 from quadriga.shared.bus.membership import Presence
 from quadriga.shared.bus.ring_buffer import INBOX, Mailbox, Newest
 from quadriga.shared.bus.settings import NO_LINK, member_settings, opening_error, router_settings
+from quadriga.shared.bus.standstill import Standstill
 from quadriga.shared.bus.zenoh_threads import one_thread_receives, staying_attached
 from quadriga.shared.config.sections import BusConfig
 from quadriga.shared.errors import BusError
@@ -84,7 +85,7 @@ class Bus:
         self._me = str(session.info.zid())
         self._inbox: Mailbox[zenoh.Sample] = Mailbox(INBOX)
         self._oversized: SimpleQueue[None] = SimpleQueue()  # counts what several threads drop
-        self._presence = Presence(self._me)
+        self._presence, self.standstill = Presence(self._me), Standstill()
         self._declared: dict[str, zenoh.LivelinessToken] = {}
         self._closed = False
         tokens, ack = f"{team}/*/*/*", f"{team}/{name}/{RECEIVED}"
@@ -283,17 +284,22 @@ class Bus:
 
     def get(self, timeout: float) -> Packet | None:
         """The oldest packet of the inbox, waiting at most `timeout` seconds for one."""
+        self.standstill.look()
         sample = self._inbox.take(timeout)
+        self.standstill.look()
         return None if sample is None else _packet(sample)
 
     def drain(self) -> list[Packet]:
         """Everything in the inbox, oldest first, without waiting."""
+        self.standstill.look()
         return [_packet(sample) for sample in self._inbox.drain()]
 
     def declare(self, stage: str) -> None:
         """Tell everyone that this process has reached `stage`; again has no effect."""
         if stage in self._declared:
             return
+        if stage == READY:
+            self.standstill.begin()
         key = f"{self.team}/{self.name}/{stage}/{self._me}"
         self._declared[stage] = self._session.liveliness().declare_token(key)
 

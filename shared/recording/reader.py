@@ -1,7 +1,7 @@
 """Reading MCAP recordings of all traffic, whole ones and such that are cut.
 
-`quadriga.shared.recording.recover` reads what is left of a damaged one. A file consists of
-chunks, packed with LZ4 or Zstandard, with checksums and an index.
+`quadriga.shared.recording.recover` reads what is left of a damaged one. Whatever MCAP allows is
+read: chunks that are packed or not, records outside of any, checksums and index that are left out.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ from quadriga.shared.wire.topics import TABLE, find_topic, topic_of
 
 M = TypeVar("M", bound=Message)
 
+BARE: Final = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)  # in chunks, and outside of any
 RECORD: Final = struct.Struct("<BQ")  # opcode, length
 LARGEST_CHUNK: Final = 1 << 27  # bytes unpacked; `recorder.chunk_kib` is half of that at most
 # What the MCAP library, LZ4 and Zstandard raise on bytes that are no record.
@@ -110,11 +111,14 @@ class Recording:
         """
         wanted: dict[int, str | None] = {}
         for opcode, content in self._records(skip=Opcode.METADATA):
-            if opcode != Opcode.CHUNK:
+            if opcode != Opcode.CHUNK and opcode not in BARE:
                 continue
             try:
-                chunk = content_of(content)
-                yield from messages_of(chunk, wanted, str(self.path), names, keys)
+                bare = opcode in BARE
+                inside = (
+                    RECORD.pack(opcode, len(content)) + content if bare else content_of(content)
+                )
+                yield from messages_of(inside, wanted, str(self.path), names, keys)
             except CORRUPT as error:
                 self.cut = f"a chunk of {len(content)} bytes is corrupt ({error})"
                 return
@@ -138,11 +142,12 @@ class Recording:
         """
         if not self.complete:
             raise self._damage_error(f"a file that is cut after {self._size:,} bytes")
+        footer_at = self._size - len(MCAP0_MAGIC) - _FOOTER
         with self.path.open("rb") as file:
-            file.seek(self._size - len(MCAP0_MAGIC) - _FOOTER)
+            file.seek(footer_at)
             end = file.read(_FOOTER)
             footer = Footer.read(stream(end[RECORD.size :]))
-            start = footer.summary_start
+            start = footer.summary_start or footer_at  # 0: no summary
             if end[:1] != bytes([Opcode.FOOTER]) or not _DATA_END < start < self._size:
                 raise self._damage_error("an index that is not where it should be")
             file.seek(start - _DATA_END)
@@ -150,10 +155,16 @@ class Recording:
             if data_end[: RECORD.size] != RECORD.pack(Opcode.DATA_END, 4):
                 raise self._damage_error("content that does not end where it should")
             summary = file.read(self._size - len(MCAP0_MAGIC) - 4 - start)
-            if zlib.crc32(summary) != footer.summary_crc:
+            if footer.summary_crc and zlib.crc32(summary) != footer.summary_crc:
                 raise self._damage_error("an index that fails its checksum")
-            if _crc(file, start - _DATA_END).to_bytes(4, "little") != data_end[RECORD.size :]:
+            crc = int.from_bytes(data_end[RECORD.size :], "little")
+            if crc and _crc(file, start - _DATA_END) != crc:
                 raise self._damage_error("content that fails its checksum")
+        if not crc:  # then those of the chunks must do
+            for _ in self.entries():
+                pass
+            if self.cut:
+                raise self._damage_error(self.cut)
 
     @property
     def notes(self) -> dict[str, dict[str, str]]:
@@ -273,22 +284,23 @@ def content_of(record: bytes) -> bytes:
     """The records in a chunk; no more is allocated than the chunk says that it unpacks to.
 
     Raises:
-        one of CORRUPT: it is damaged, or packed with neither LZ4 nor Zstandard.
+        one of CORRUPT: it is damaged, or packed with something else than LZ4 or Zstandard.
     """
     chunk = Chunk.read(stream(record))
     size: int = chunk.uncompressed_size
-    if chunk.compression not in ("lz4", "zstd") or size > LARGEST_CHUNK:
+    if chunk.compression not in ("", "lz4", "zstd") or size > LARGEST_CHUNK:
         raise ValueError(f"{size} bytes packed with {chunk.compression[:16]!r}")
+    content: bytes = chunk.data
     if chunk.compression == "lz4":
         unpack = lz4.frame.LZ4FrameDecompressor()
-        content: bytes = unpack.decompress(chunk.data, max_length=size + 1)
-    elif zstandard.frame_content_size(chunk.data) in (size, -1):
+        content = unpack.decompress(chunk.data, max_length=size + 1)
+    elif chunk.compression:
+        if zstandard.frame_content_size(chunk.data) not in (size, -1):
+            raise ValueError(f"a frame that does not unpack to {size} bytes")  # nor is allocated
         content = zstandard.ZstdDecompressor().decompress(chunk.data, max_output_size=size)
-    else:  # as much would be allocated as the frame says
-        raise ValueError(f"a frame that does not unpack to {size} bytes")
     if len(content) != size:
         raise ValueError(f"{len(content)} bytes where {size} were packed")
-    if zlib.crc32(content) != chunk.uncompressed_crc:
+    if chunk.uncompressed_crc and zlib.crc32(content) != chunk.uncompressed_crc:
         raise ValueError("its checksum is wrong")
     return content
 

@@ -13,6 +13,7 @@ from quadriga.plant.process import _check_end
 from quadriga.plant.protocol import Plant
 from quadriga.plant.server import FALL_LINGER_MS, PlantServer
 from quadriga.shared.bus.session import Bus
+from quadriga.shared.bus.standstill import Standstill
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.wire import codes
 from quadriga.shared.wire.codec import MAX_TEXT, decode, encode
@@ -28,6 +29,7 @@ class Listener:
     def __init__(self) -> None:
         self.packets: list[tuple[str, bool, bytes]] = []
         self.arrived: list[tuple[str, bytes]] = []
+        self.standstill = Standstill()
 
     def publisher(
         self, key: str, *, droppable: bool = False, urgent: bool = False

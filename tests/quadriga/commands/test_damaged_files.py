@@ -49,7 +49,7 @@ def test_each_file_that_is_none_gives_one_clear_error(
         (b"", "an empty file"),
         (b"PK\x03\x04 a zip of something" * 50, "hold nothing of a recording"),
         (whole.replace(b"quadriga", b"somebody")[:5000], "hold nothing of a recording"),
-        (of_others.getvalue(), "hold nothing of a recording"),
+        (of_others.getvalue(), "got a whole MCAP file of another program"),
     ):
         path.unlink(missing_ok=True)
         if content is not None:
