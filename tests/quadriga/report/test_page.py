@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from quadriga.commands.parser import main
+from quadriga.recordings.metadata import build_metadata
 from quadriga.recordings.traces import MeasurementTrace
 from quadriga.recordings.truth import TruthTrace
 from quadriga.report.page import build_page, write_page
@@ -282,7 +283,7 @@ def test_no_recording_is_one_clear_error(
 def test_an_empty_recording_and_a_page_that_cannot_be_written_are_errors(
     write_run: WriteRun, tmp_path: Path
 ) -> None:
-    RecordingWriter(tmp_path / "none.mcap", {"config_json": "{}"}).finish()
+    RecordingWriter(tmp_path / "none.mcap", build_metadata(run_config(1, 0.5), "")).finish()
     with pytest.raises(RecordingError, match="without messages"):
         read_run(tmp_path / "none.mcap")
     run = read_run(write_run(run_config(1, 0.5)) / "run.mcap")

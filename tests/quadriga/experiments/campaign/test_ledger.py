@@ -13,7 +13,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from quadriga.experiments.campaign.ledger import ROWS, Ledger, read_manifest, read_rows
-from quadriga.experiments.campaign.manifest import Manifest
 from quadriga.experiments.plan import Group
 from quadriga.experiments.trial.figures_of_merit import Figures
 from quadriga.experiments.trial.outcome import build_outcome, column_names, from_cells, to_cells
@@ -153,14 +152,6 @@ def test_a_folder_of_something_else_is_no_campaign(tmp_path: Path) -> None:
         (tmp_path / "campaign.json").write_text(text, encoding="utf-8")
         with pytest.raises(ConfigError, match=r"campaign\.json"):
             read_manifest(tmp_path)
-
-
-def test_keys_of_an_earlier_version_are_read_under_todays_names() -> None:
-    old = {**asdict(manifest("none")), "variants": {"soft": {"controller.leash": 0.1}}}
-    old["sweeps"] = [{"key": "controller.mu_least", "name": "mu"}]
-    read = Manifest.from_dict(json.loads(json.dumps(old)))
-    assert read.variants == {"soft": {"controller.position_error_limit": 0.1}}
-    assert [sweep.key for sweep in read.sweeps] == ["controller.mu_min"]
 
 
 def test_whatever_a_planner_calls_its_plans_they_are_counted() -> None:
