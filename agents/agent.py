@@ -51,12 +51,12 @@ from quadriga.agents.step_io import Outputs as Outputs
 from quadriga.agents.tasks import Tasks
 from quadriga.agents.teammates import Teammates, TeamWatch, has_operator
 from quadriga.agents.validate import Validator
+from quadriga.shared.codes import with_detail
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import Array, robot_names
+from quadriga.shared.messages import Command, Measurement, Reference
+from quadriga.shared.robots.conventions import Array, robot_names
 from quadriga.shared.runtime.record import record
-from quadriga.shared.wire.codes import with_detail
-from quadriga.shared.wire.messages import Command, Measurement, Reference
-from quadriga.shared.wire.topics import REFERENCE, REFERENCE_EPOCH_MS, SAMPLE_MS
+from quadriga.shared.topics import REFERENCE, REFERENCE_EPOCH_MS, SAMPLE_MS
 
 _TRUTH_AGE_MS: Final = 20  # of the simulator's truth, where it stands in for an estimator
 _LONGEST_DT: Final = 0.02  # s, after a gap in the ticks the filters advance by no more than this

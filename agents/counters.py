@@ -9,7 +9,7 @@ from quadriga.agents.controller.whole_body.problem import UNCONSTRAINED, WholeBo
 from quadriga.agents.planner.qp_solver import SOLVED
 from quadriga.agents.planning.interface import PlanningOutputs
 from quadriga.agents.validate import Validated
-from quadriga.shared.wire.codes import code_of
+from quadriga.shared.codes import code_of
 
 IMU_INVALID: Final = "imu_invalid"
 ENCODER_INVALID: Final = "encoder_invalid"

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import N_LEGS, Array
+from quadriga.shared.robots.conventions import N_LEGS, Array
 
 # Diagonal pairs in the leg order FL FR RL RR: row 0 stands in the first half cycle.
 _BITS = np.array([8, 4, 2, 1])

@@ -14,9 +14,9 @@ from dataclasses import replace
 from typing import Final
 
 from quadriga.agents.modes import COMMANDED, LOSSES, RISING, STAND, WALK, Mode, rests
+from quadriga.shared.codes import HALTS, INPUT_LOST, RESUMED, RISES, STANDS_AGAIN, code_of
+from quadriga.shared.messages import Event, Reference
 from quadriga.shared.runtime.record import record
-from quadriga.shared.wire.codes import HALTS, INPUT_LOST, RESUMED, RISES, STANDS_AGAIN, code_of
-from quadriga.shared.wire.messages import Event, Reference
 
 WORD_MS: Final = 5000  # for which the operator's word is obeyed
 RAMP_MS: Final = 1000  # from standing to the commanded speed

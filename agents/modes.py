@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
+from quadriga.shared.codes import code_of
 from quadriga.shared.runtime.record import record
-from quadriga.shared.wire.codes import code_of
 
 STAND: Final = "stand"
 WALK: Final = "walk"

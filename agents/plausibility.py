@@ -11,10 +11,10 @@ from typing import Final
 import numpy as np
 
 from quadriga.shared.config.sections import Config, ReferenceConfig
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.robot.spec import RobotSpec
+from quadriga.shared.messages import Reference, State
+from quadriga.shared.robots.conventions import Array
+from quadriga.shared.robots.spec import RobotSpec
 from quadriga.shared.runtime.jit import compiled
-from quadriga.shared.wire.messages import Reference, State
 
 # Times the robot's weight, each component of each foot's force: a leg that stands carries 1.7 times
 # (A1) at its knee's greatest torque. A planner that is allowed larger deviations may plan them.

@@ -14,12 +14,12 @@ from quadriga.agents.gait import nominal_forces, scheduled_stance
 from quadriga.agents.planning.team import Central, CentralState
 from quadriga.agents.time_grid import first_step, step_ms
 from quadriga.agents.validate import AGREES_MS, standing_torques
+from quadriga.shared.codec import decode, encode
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import GRAVITY, N_JOINTS, N_LEGS, N_OUTPUTS, robot_names
-from quadriga.shared.robot.spec import RobotSpec
-from quadriga.shared.wire.codec import decode, encode
-from quadriga.shared.wire.messages import Measurement, Reference, State
-from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS, SAMPLE_MS
+from quadriga.shared.messages import Measurement, Reference, State
+from quadriga.shared.robots.conventions import GRAVITY, N_JOINTS, N_LEGS, N_OUTPUTS, robot_names
+from quadriga.shared.robots.spec import RobotSpec
+from quadriga.shared.topics import REFERENCE_EPOCH_MS, SAMPLE_MS
 
 _LEAN = 0.8  # of the tilt that is a fall
 

@@ -27,12 +27,12 @@ from quadriga.agents.modes import (
     Mode,
     enter_passive,
 )
+from quadriga.shared.codes import code_of, with_detail
 from quadriga.shared.config.sections import BRIDGED, Config
-from quadriga.shared.robot.conventions import N_JOINTS, Array
-from quadriga.shared.robot.motions import Motion, posture_at, way_up
+from quadriga.shared.messages import Command, EStop, Reset, State
+from quadriga.shared.robots.conventions import N_JOINTS, Array
+from quadriga.shared.robots.motions import Motion, posture_at, way_up
 from quadriga.shared.runtime.record import record
-from quadriga.shared.wire.codes import code_of, with_detail
-from quadriga.shared.wire.messages import Command, EStop, Reset, State
 
 _SECONDS: Final = 1.5  # from lying on folded legs to the stand
 _SETTLE_MS: Final = 200  # at the stand, before it is looked at

@@ -16,13 +16,13 @@ from quadriga.shared.bus.discovery import join
 from quadriga.shared.bus.liveness import Liveness
 from quadriga.shared.bus.process_info import ProcessInfo
 from quadriga.shared.bus.session import HERE, POLL, READY, Bus
+from quadriga.shared.codec import encode
 from quadriga.shared.config.sections import Config
+from quadriga.shared.messages import State
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns
 from quadriga.shared.runtime.scheduling import at_work
 from quadriga.shared.runtime.signals import interruptible
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.messages import State
-from quadriga.shared.wire.topics import AGENT_EVENT, COMMAND, INPUTS, MEASUREMENT, PLAN, STATUS
+from quadriga.shared.topics import AGENT_EVENT, COMMAND, INPUTS, MEASUREMENT, PLAN, STATUS
 
 
 class RememberedTick(Protocol):

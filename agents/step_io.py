@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.runtime.record import record
-from quadriga.shared.wire.messages import (
+from quadriga.shared.messages import (
     Command,
     EStop,
     Event,
@@ -20,6 +18,8 @@ from quadriga.shared.wire.messages import (
     Status,
     Truth,
 )
+from quadriga.shared.robots.conventions import Array
+from quadriga.shared.runtime.record import record
 
 
 @record
@@ -62,7 +62,7 @@ class Inputs:
 
     @property
     def words(self) -> tuple[EStop | SafeStop | Reset | Resume | None, ...]:
-        """What people have said, in the order of `wire.topics.WORDS`."""
+        """What people have said, in the order of `shared.topics.WORDS`."""
         return self.estop, self.stop, self.reset, self.resume
 
 

@@ -8,8 +8,8 @@ from quadriga.agents.controller.controller import Task
 from quadriga.agents.modes import WALK, Mode
 from quadriga.agents.planning.active_plan import Setpoint
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.wire.messages import Reference
+from quadriga.shared.messages import Reference
+from quadriga.shared.robots.conventions import Array
 
 _ZERO = np.zeros(12)
 

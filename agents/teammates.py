@@ -17,11 +17,11 @@ from dataclasses import field
 from typing import Final
 
 from quadriga.agents.modes import STAND, STOPPING, WALK, Mode, rests
+from quadriga.shared.codes import BACK, GONE, LOWERED, OPERATOR_BACK, OPERATOR_GONE, SILENT
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.messages import Event, Reference, Status
+from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.runtime.record import record
-from quadriga.shared.wire.codes import BACK, GONE, LOWERED, OPERATOR_BACK, OPERATOR_GONE, SILENT
-from quadriga.shared.wire.messages import Event, Reference, Status
 
 SILENCE_MS: Final = 500  # without a status, after which a robot is lost
 GRACE_MS: Final = 1000  # for which robots that walk again may begin one after the other

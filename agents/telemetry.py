@@ -9,8 +9,8 @@ import numpy as np
 
 from quadriga.agents.modes import WALK
 from quadriga.agents.step_io import Outputs
+from quadriga.shared.messages import Status
 from quadriga.shared.runtime.histogram import Histogram
-from quadriga.shared.wire.messages import Status
 
 PERIOD_MS: Final = 100
 _TICK_MS: Final = 1.0  # what a tick may take in real time

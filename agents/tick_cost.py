@@ -64,7 +64,7 @@ def check_cost(robot: str, cost_ms: float, agents: int, cores: int) -> None:
         f"{robot} in real time",
         f"{cost_ms:.2f} ms of processor time for a tick",
         f"at most {has:.2f} ms, of {shared}",
-        "too slow a computer: --mode lockstep waits for it; runtime.refuse_overload = false tries",
+        "too slow a computer: --mode lockstep waits for it; runtime.check_cpu = false tries",
     )
 
 
@@ -87,7 +87,7 @@ def rehearse_in_time(config: Config, agent: Agent, *, refuse: bool) -> None:
         ProcessError: see `check_cost`.
     """
     cost_ms = _measure(config, agent)
-    if refuse and config.world.mode == "realtime" and config.runtime.refuse_overload:
+    if refuse and config.world.mode == "realtime" and config.runtime.check_cpu:
         agents, cores = config.team.robots if is_loopback(config.bus.endpoint) else 1, count_cores()
         if cost_ms > _share_ms(agents, cores):
             cost_ms = _measure(config, agent)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from quadriga.agents.gait import scheduled_stance
 from quadriga.shared.config.sections import Config
-from quadriga.shared.wire.topics import SAMPLE_MS
+from quadriga.shared.topics import SAMPLE_MS
 
 
 def step_ms(config: Config) -> int:

@@ -31,9 +31,9 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import max_ages, periods
 from quadriga.shared.errors import ProcessError, QuadrigaError
 from quadriga.shared.members import plant_name
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.signals import interrupt_on_sigterm
-from quadriga.shared.wire.topics import MEASUREMENT, PLAN, SAMPLE_MS
+from quadriga.shared.topics import MEASUREMENT, PLAN, SAMPLE_MS
 from quadriga.sim_server.emulator.link import LinkFaults
 from quadriga.tables import Table, print_tables
 

@@ -14,14 +14,14 @@ from typing import Final
 import numpy as np
 
 from quadriga.shared.bus.session import HERE, READY, Arrival, Bus
+from quadriga.shared.codec import encode, envelope
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import SIM
+from quadriga.shared.messages import Measurement, Plan
 from quadriga.shared.runtime.clock import monotonic_ns, sleep
 from quadriga.shared.runtime.scheduling import take_priority
 from quadriga.shared.runtime.signals import die_with_parent
-from quadriga.shared.wire.codec import encode, envelope
-from quadriga.shared.wire.messages import Measurement, Plan
-from quadriga.shared.wire.topics import MEASUREMENT, PLAN, SAMPLE_MS
+from quadriga.shared.topics import MEASUREMENT, PLAN, SAMPLE_MS
 
 _PATIENCE: Final = 60.0  # s, for the other to be there: the air may lose a lot
 

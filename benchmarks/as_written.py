@@ -21,7 +21,7 @@ from scipy import sparse
 from quadriga.agents.predictor.episode import U_SCALE, Y_SCALE, Episode
 from quadriga.agents.predictor.hankel import split
 from quadriga.shared.config.sections import PlannerConfig
-from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
+from quadriga.shared.robots.conventions import N_FORCES, N_OUTPUTS, Array
 
 Stance = NDArray[np.bool_]
 

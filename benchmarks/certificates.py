@@ -57,7 +57,7 @@ def main() -> int:
     keys = {
         "team.robots": given.robots,
         "world.mode": "realtime",
-        "world.seconds": given.seconds,
+        "world.duration": given.seconds,
         "planner.kind": given.planner,
     }
     console = Console(highlight=False)

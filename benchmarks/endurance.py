@@ -61,7 +61,7 @@ def main() -> int:
             "team.robots": given.robots,
             "world.mode": "realtime",
             "world.seed": given.seed,
-            "world.seconds": 60.0 * given.minutes,
+            "world.duration": 60.0 * given.minutes,
             "planner.kind": given.planner,
             "gait.stand_ms": _STAND_MS,
             "team.auto_resume": True,
@@ -102,7 +102,7 @@ def _walk(
     config: Config, folder: Path, predictor: Path | None, console: Console, speed: float
 ) -> Samples:
     samples: Samples = {}
-    begun, total = monotonic(), config.world.seconds / speed
+    begun, total = monotonic(), config.world.duration / speed
     rows = process_table(config, folder, predictor, "")
     if speed < 1.0:
         rows = tuple(in_slow_motion(row, speed) for row in rows)

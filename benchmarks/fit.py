@@ -26,7 +26,7 @@ from quadriga.agents.predictor.episode import Episode
 from quadriga.agents.predictor.fits import FITS, fit
 from quadriga.agents.predictor.predictor import PredictorMeta
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS
+from quadriga.shared.robots.conventions import N_FORCES, N_OUTPUTS
 from quadriga.shared.runtime.clock import monotonic
 
 EPISODE = 1050  # samples of one walk

@@ -29,7 +29,7 @@ from benchmarks.four_tank_peers import (
 from quadriga.agents.predictor.control import DataDrivenController, Deepc
 from quadriga.agents.predictor.four_tank import FourTank, LinearPlant, four_tank
 from quadriga.agents.predictor.plant import PlantPredictor, fit
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.blas import use_one_blas_thread
 from quadriga.shared.runtime.clock import monotonic
 

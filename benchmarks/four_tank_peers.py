@@ -14,7 +14,7 @@ from typing import Any, Final, Protocol
 import numpy as np
 
 from quadriga.agents.predictor.four_tank import FourTank
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 
 _TOLERANCES: Final = (1e-13, 1e-11, 1e-9)
 _EXACT: Final = 1e4  # weight of a slack's 1-norm with which no slack is used, without noise

@@ -22,12 +22,12 @@ from quadriga.agents.controller.memory import Memory
 from quadriga.agents.controller.schedule import Schedule
 from quadriga.agents.controller.sensed import Sensed
 from quadriga.agents.predictor.predictor import Predictor
+from quadriga.shared.codec import decode, encode
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.messages import State
+from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.clock import monotonic_ns
 from quadriga.shared.runtime.collector import collector_off
-from quadriga.shared.wire.codec import decode, encode
-from quadriga.shared.wire.messages import State
 
 STAGES: Final = ("decode", "sense", "gait, plan", "terms, references, QP", "encode")
 _L2: Final = Path("/sys/devices/system/cpu/cpu0/cache/index2/size")

@@ -14,9 +14,9 @@ import pinocchio as pin
 import tsid
 
 from quadriga.agents.controller.whole_body.problem import Weights
-from quadriga.shared.robot.a1 import A1
-from quadriga.shared.robot.conventions import FOOT_FRAMES, Array
-from quadriga.shared.robot.pinocchio_model import build_pinocchio_model
+from quadriga.shared.robots.a1 import A1
+from quadriga.shared.robots.conventions import FOOT_FRAMES, Array
+from quadriga.shared.robots.pinocchio_model import build_pinocchio_model
 
 if TYPE_CHECKING:
     from benchmarks.low_level_ticks import TsidCase

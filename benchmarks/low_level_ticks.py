@@ -8,9 +8,9 @@ from quadriga.agents.agent import Agent, AgentState, Inputs, Outputs
 from quadriga.agents.controller.whole_body.problem import Goal
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.identification.rollout import Rollout
+from quadriga.shared.codec import encode
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.wire.codec import encode
+from quadriga.shared.robots.conventions import Array
 from quadriga.team.operator import references_of
 
 
@@ -44,7 +44,7 @@ def record(config: Config, predictor: Predictor | None) -> list[AgentTick]:
     rollout = Rollout(config, predictor, references_of(config))
     agent = _RecordingAgent(rollout.agents["r1"])
     rollout.agents["r1"] = agent
-    for _ in rollout.ticks(round(1000 * config.world.seconds)):
+    for _ in rollout.ticks(round(1000 * config.world.duration)):
         pass
     return agent.ticks
 

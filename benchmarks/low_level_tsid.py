@@ -30,8 +30,8 @@ from quadriga.agents.controller.whole_body.problem import N_WEIGHTS, Goal, Weigh
 from quadriga.agents.controller.whole_body.solution import finish, solve_closed_form
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import A1
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.a1 import A1
+from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.clock import monotonic_ns
 from quadriga.shared.runtime.collector import collector_off
 from quadriga.shared.runtime.jit import compiled

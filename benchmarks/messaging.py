@@ -17,15 +17,15 @@ import numpy as np
 
 from benchmarks.children import SPAWN, child, result_of, running
 from quadriga.shared.bus.session import HERE, Bus
+from quadriga.shared.codec import encode
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import SIM
-from quadriga.shared.robot.conventions import N_JOINTS, robot_names
+from quadriga.shared.messages import Command, State
+from quadriga.shared.robots.conventions import N_JOINTS, robot_names
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns, sleep
 from quadriga.shared.runtime.scheduling import take_priority
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.messages import Command, State
-from quadriga.shared.wire.topics import COMMAND, STATE
+from quadriga.shared.topics import COMMAND, STATE
 from quadriga.team.endpoint import free_endpoint
 
 TRANSPORTS: Final = ("bus", "socket")

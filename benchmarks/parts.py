@@ -117,7 +117,7 @@ def realtime(options: Options, console: Console, tell: Tell) -> Part:
     config = replace(
         config,
         world=replace(config.world, mode="realtime"),
-        runtime=replace(config.runtime, refuse_overload=False),
+        runtime=replace(config.runtime, check_cpu=False),
     )
     sha256 = "" if predictor is None else predictor_sha256(predictor)
     return measure(config, path, sha256, seeds, tell)
@@ -177,7 +177,7 @@ def team(
     from quadriga.shared.planner_kinds import find_kind
 
     config = load(
-        None, {"team.robots": robots, "world.seconds": seconds, "planner.kind": options.planner}
+        None, {"team.robots": robots, "world.duration": seconds, "planner.kind": options.planner}
     )
     if not find_kind(options.planner).needs_predictor:
         return config, None, None

@@ -46,7 +46,7 @@ from quadriga.agents.predictor.predictor import Predictor
 from quadriga.identification.predictors import ensure_data, ensure_predictor
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 
 # Limits of the figures at n = 5.
 TARGETS = (
@@ -143,7 +143,7 @@ def record_walks(
     robots: int, seconds: float, console: Console, seed: int = SEED
 ) -> tuple[Config, Predictor, list[list[PlanningTick]]]:
     """A team, its predictor, and the planning steps of its walks."""
-    world = {"world.seconds": seconds, "world.seed": seed}
+    world = {"world.duration": seconds, "world.seed": seed}
     config = load(None, {"team.robots": robots, **world, **AS_IN_THE_PAPER})
     predictor = load_checked(ensure_predictor(config, console), config)[0]
     worlds = [replace(config.world, **changes) for changes in WALKS]

@@ -26,7 +26,7 @@ from quadriga.agents.predictor.deepc import reduce
 from quadriga.agents.predictor.episode import Episode
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 
 AS_WRITTEN = "as written"
 _AT_BOUND = 1e-6  # N, of the exact answer

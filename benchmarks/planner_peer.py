@@ -15,7 +15,7 @@ from benchmarks.as_written import force_bounds
 from quadriga.agents.predictor.episode import U_SCALE, Y_SCALE, Episode
 from quadriga.agents.predictor.hankel import split
 from quadriga.shared.config.sections import PlannerConfig
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 
 AVAILABLE = find_spec("cvxpy") is not None
 

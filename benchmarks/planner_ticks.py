@@ -15,9 +15,9 @@ from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.time_grid import horizon_stance, step_ms
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import Array, robot_names
-from quadriga.shared.wire.messages import Measurement, Plan, Reference
-from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS, SAMPLE_MS
+from quadriga.shared.messages import Measurement, Plan, Reference
+from quadriga.shared.robots.conventions import Array, robot_names
+from quadriga.shared.topics import REFERENCE_EPOCH_MS, SAMPLE_MS
 from quadriga.team.operator import reference_at, references_of
 
 
@@ -52,7 +52,7 @@ def record(config: Config, predictor: Predictor) -> list[PlanningTick]:
     samples: dict[str, dict[int, Measurement]] = {name: {} for name in names}
     plans: dict[str, dict[int, Plan]] = {name: {} for name in names}
     rollout = Rollout(config, predictor, references_of(config))
-    for tick in rollout.ticks(round(1000 * config.world.seconds)):
+    for tick in rollout.ticks(round(1000 * config.world.duration)):
         for name, out in tick.outputs.items():
             if out.measurement is not None:
                 samples[name][out.measurement.tick] = out.measurement

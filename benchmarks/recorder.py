@@ -21,15 +21,15 @@ import numpy as np
 
 from benchmarks.children import SPAWN, child, running
 from quadriga.shared.bus.session import HERE, READY, Bus
+from quadriga.shared.codec import encode
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.errors import RecordingError
 from quadriga.shared.members import SIM
+from quadriga.shared.messages import Reference
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.runtime.clock import monotonic, sleep
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.messages import Reference
 from quadriga.team.endpoint import free_endpoint
 
 KEYS = 10  # of each publisher

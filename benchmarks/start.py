@@ -18,7 +18,7 @@ from quadriga.shared.config.write import to_toml
 from quadriga.shared.recording.metadata import RECORDING
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.runtime.clock import monotonic, wall_ns
-from quadriga.shared.wire.topics import STATE
+from quadriga.shared.topics import STATE
 from quadriga.team.endpoint import free_endpoint
 
 _IMPORTS = "import quadriga.commands.parser, quadriga.agents.process"

@@ -15,13 +15,13 @@ from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.predictor.store import predictor_sha256
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.bus.session import Bus
+from quadriga.shared.codec import decode
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
+from quadriga.shared.messages import Truth
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns
 from quadriga.shared.runtime.collector import collector_off
-from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.messages import Truth
-from quadriga.shared.wire.topics import TRUTH
+from quadriga.shared.topics import TRUTH
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import Launch, process_table
 from quadriga.team.operator import references_of
@@ -38,7 +38,7 @@ def alone(config: Config, predictor: Predictor | None) -> dict[str, float]:
         for agent in timed:
             agent.ns = agent.planner_ns = 0
         begun, ticks = monotonic_ns(), 0
-        for _ in rollout.ticks(round(1000 * config.world.seconds) - 1):
+        for _ in rollout.ticks(round(1000 * config.world.duration) - 1):
             ticks += 1
         took = monotonic_ns() - begun
     spent, planners = sum(a.ns for a in timed), sum(a.planner_ns for a in timed)
@@ -86,8 +86,8 @@ def over_the_bus(
         with Launch(rows, folder / "logs") as launch, _Watch(config) as watch, beside(folder):
 
             def look() -> bool:
-                tell(f"{watch.seconds:.1f}/{config.world.seconds:g} s")
-                if not memory and watch.seconds > 0.5 * config.world.seconds:
+                tell(f"{watch.seconds:.1f}/{config.world.duration:g} s")
+                if not memory and watch.seconds > 0.5 * config.world.duration:
                     memory.update({name: _memory(pid) for name, pid in launch.pids.items()})
                 return False
 

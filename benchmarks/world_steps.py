@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from quadriga.shared.config.load import load
-from quadriga.shared.robot.a1 import A1
-from quadriga.shared.robot.conventions import N_JOINTS
+from quadriga.shared.messages import Command
+from quadriga.shared.robots.a1 import A1
+from quadriga.shared.robots.conventions import N_JOINTS
 from quadriga.shared.runtime.clock import monotonic_ns
-from quadriga.shared.wire.messages import Command
 from quadriga.sim_server.world.world import World
 
 _SETTLING = 200  # ticks, until all stand on their feet

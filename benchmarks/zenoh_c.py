@@ -19,7 +19,7 @@ from typing import Final
 import numpy as np
 
 from benchmarks.messaging import command_bytes, measure, state_bytes
-from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.runtime.signals import interrupt_on_sigterm
 from quadriga.tables import Table, print_tables
 from quadriga.team.endpoint import free_endpoint

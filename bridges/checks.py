@@ -12,9 +12,9 @@ from quadriga.bridges.limits import temperature_limits
 from quadriga.bridges.supervisor import tilt_of
 from quadriga.shared.config.bridge import BridgeConfig
 from quadriga.shared.errors import CheckError
-from quadriga.shared.robot.conventions import FOOT_FRAMES, GRAVITY, JOINT_NAMES, Array
-from quadriga.shared.robot.pinocchio_model import build_pinocchio_model
-from quadriga.shared.robot.spec import RobotSpec
+from quadriga.shared.robots.conventions import FOOT_FRAMES, GRAVITY, JOINT_NAMES, Array
+from quadriga.shared.robots.pinocchio_model import build_pinocchio_model
+from quadriga.shared.robots.spec import RobotSpec
 from quadriga.shared.unitree.packets import PROTECTED, RobotReport
 
 _FLAT: Final = 0.6  # rad, tilt at which a robot still lies as it should

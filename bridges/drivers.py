@@ -12,7 +12,7 @@ import numpy as np
 from quadriga.bridges.postures import passive
 from quadriga.shared.config.bridge import BridgeConfig
 from quadriga.shared.errors import BridgeError, ConfigError
-from quadriga.shared.robot.conventions import N_JOINTS
+from quadriga.shared.robots.conventions import N_JOINTS
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns, sleep
 from quadriga.shared.unitree import rpc
 from quadriga.shared.unitree.codecs import CODECS, GO2, Codec

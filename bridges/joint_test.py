@@ -14,8 +14,8 @@ from quadriga.bridges.supervisor import TRACKING_ERROR, BridgeMode, Request, Sup
 from quadriga.bridges.watchdog import Watchdog
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import CheckError
-from quadriga.shared.robot.conventions import JOINT_NAMES, N_JOINTS, Array
-from quadriga.shared.robot.motions import Motion
+from quadriga.shared.robots.conventions import JOINT_NAMES, N_JOINTS, Array
+from quadriga.shared.robots.motions import Motion
 from quadriga.shared.runtime.clock import Rate
 
 _MOVED: Final = 0.5  # of the way that is asked for: with less a joint has not moved

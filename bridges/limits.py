@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from quadriga.plant.commands import MOST_KD, MOST_KP
 from quadriga.shared.config.bridge import BridgeConfig
-from quadriga.shared.robot.conventions import N_JOINTS, Array
-from quadriga.shared.robot.spec import RobotSpec
+from quadriga.shared.robots.conventions import N_JOINTS, Array
+from quadriga.shared.robots.spec import RobotSpec
 from quadriga.shared.runtime.jit import compiled
 from quadriga.shared.unitree.packets import MotorTargets
 

@@ -23,17 +23,17 @@ from quadriga.bridges.supervisor import (
 )
 from quadriga.bridges.watchdog import BEAT_MS, Watchdog
 from quadriga.plant.protocol import Plant
+from quadriga.shared import codes
 from quadriga.shared.config.bridge import BridgeConfig
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import CheckError, ConfigError
+from quadriga.shared.messages import Command, Event, State, Status
 from quadriga.shared.printable import printable_line
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.clock import Rate, monotonic
 from quadriga.shared.runtime.histogram import Histogram
+from quadriga.shared.topics import SAMPLE_MS
 from quadriga.shared.unitree.packets import RobotReport
-from quadriga.shared.wire import codes
-from quadriga.shared.wire.messages import Command, Event, State, Status
-from quadriga.shared.wire.topics import SAMPLE_MS
 
 TICK: Final = 1e-3  # s
 _SLACK_MS: Final = 3000  # beyond what a motion takes
@@ -444,7 +444,7 @@ def build_bridge(
         CheckError: the robot is not as it must be.
     """
     if len(names) != 1:
-        raise ConfigError("team.plants", f"a plant of {', '.join(names)}", "'each'")
+        raise ConfigError("team.plant_per_robot", f"a plant of {', '.join(names)}", "true")
     kind, bridge = config.team.robot, bridge_of(config, names[0])
     driver = open_driver(kind, bridge)
     watchdog = Watchdog(kind, bridge) if armed else None

@@ -7,9 +7,9 @@ from typing import Final
 import numpy as np
 
 from quadriga.shared.config.bridge import BridgeConfig
-from quadriga.shared.robot.conventions import JOINT_NAMES, N_JOINTS, Array
-from quadriga.shared.robot.motions import Motion
-from quadriga.shared.robot.spec import RobotSpec
+from quadriga.shared.robots.conventions import JOINT_NAMES, N_JOINTS, Array
+from quadriga.shared.robots.motions import Motion
+from quadriga.shared.robots.spec import RobotSpec
 from quadriga.shared.unitree.packets import OFF, MotorTargets
 
 DAMPING: Final = 3.0  # N·m·s/rad, of joints that are damped

@@ -34,10 +34,12 @@ from quadriga.bridges.postures import (
     towards,
     tracking_error,
 )
+from quadriga.shared.codes import with_detail
 from quadriga.shared.config.bridge import BridgeConfig
-from quadriga.shared.robot.conventions import JOINT_NAMES, N_JOINTS, Array
-from quadriga.shared.robot.motions import Motion, posture_at, way_down, way_up
-from quadriga.shared.robot.spec import RobotSpec
+from quadriga.shared.messages import Command
+from quadriga.shared.robots.conventions import JOINT_NAMES, N_JOINTS, Array
+from quadriga.shared.robots.motions import Motion, posture_at, way_down, way_up
+from quadriga.shared.robots.spec import RobotSpec
 from quadriga.shared.runtime.record import record
 from quadriga.shared.unitree.packets import (
     PROTECTED,
@@ -46,8 +48,6 @@ from quadriga.shared.unitree.packets import (
     are_pressed,
     parse_buttons,
 )
-from quadriga.shared.wire.codes import with_detail
-from quadriga.shared.wire.messages import Command
 
 TRACKING_ERROR: Final = "tracking-error"  # why a test of joints is stopped
 _HOTTER: Final = 8.0  # °C above `temperature_max` that stop a robot: its motors end at 10 more

@@ -22,7 +22,7 @@ from quadriga.bridges.drivers import RobotDriver, open_driver
 from quadriga.bridges.postures import damped, passive
 from quadriga.shared.config.bridge import BridgeConfig
 from quadriga.shared.errors import BridgeError
-from quadriga.shared.robot.conventions import N_JOINTS
+from quadriga.shared.robots.conventions import N_JOINTS
 from quadriga.shared.runtime.clock import Rate
 from quadriga.shared.runtime.installed import PYTHON
 from quadriga.shared.runtime.scheduling import take_priority

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from quadriga.plant.server import PlantServer
+from quadriga.shared import codes
 from quadriga.shared.bus.session import HERE
 from quadriga.shared.members import OPERATOR
-from quadriga.shared.wire import codes
 
 
 def note_absences(server: PlantServer) -> None:

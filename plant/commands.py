@@ -14,12 +14,12 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from quadriga.shared.codec import decode, encode
 from quadriga.shared.errors import MessageError
-from quadriga.shared.robot.conventions import N_JOINTS, Array
-from quadriga.shared.robot.spec import RobotSpec
-from quadriga.shared.wire.codec import decode, encode
-from quadriga.shared.wire.messages import Command
-from quadriga.shared.wire.topics import COMMAND
+from quadriga.shared.messages import Command
+from quadriga.shared.robots.conventions import N_JOINTS, Array
+from quadriga.shared.robots.spec import RobotSpec
+from quadriga.shared.topics import COMMAND
 
 MOST_KP: Final = 500.0  # N·m/rad, stiffer than any of these robots' motors are run
 MOST_KD: Final = 30.0  # N·m·s/rad

@@ -8,8 +8,8 @@ from typing import Final
 
 import numpy as np
 
+from quadriga.shared.messages import Status
 from quadriga.shared.runtime.histogram import Histogram
-from quadriga.shared.wire.messages import Status
 
 PERIOD_MS: Final = 1000
 MODE: Final = "realtime"

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from quadriga.shared.wire import codes
+from quadriga.shared import codes
 
 
 class End(NamedTuple):
-    """Why a walk is over: a code of `quadriga.shared.wire.codes.EVENTS`, and prose."""
+    """Why a walk is over: a code of `quadriga.shared.codes.EVENTS`, and prose."""
 
     code: str
     detail: str

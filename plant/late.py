@@ -7,8 +7,8 @@ from typing import Final
 import numpy as np
 
 from quadriga.shared.config.sections import WorldConfig
-from quadriga.shared.robot.conventions import N_JOINTS
-from quadriga.shared.wire.messages import Command, State
+from quadriga.shared.messages import Command, State
+from quadriga.shared.robots.conventions import N_JOINTS
 
 FRESH: Final = "fresh"
 HOLD: Final = "hold"

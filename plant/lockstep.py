@@ -8,10 +8,10 @@ from typing import Final
 from quadriga.plant.end import TOLD_TO_STOP, End
 from quadriga.plant.server import PlantServer
 from quadriga.plant.team_time import plant_gone
+from quadriga.shared import codes
 from quadriga.shared.bus.session import HERE, POLL
+from quadriga.shared.messages import Command
 from quadriga.shared.runtime.clock import monotonic
-from quadriga.shared.wire import codes
-from quadriga.shared.wire.messages import Command
 
 _ALONE: Final = 0.001  # s, pace of a world that nobody answers, so that robots can come back
 

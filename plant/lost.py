@@ -14,9 +14,9 @@ import numpy as np
 
 from quadriga.plant.late import damp_joints
 from quadriga.shared.config.sections import SIMULATED, Config
-from quadriga.shared.robot.conventions import N_JOINTS, Array
-from quadriga.shared.robot.motions import Motion, posture_at, way_down
-from quadriga.shared.wire.messages import Command, State
+from quadriga.shared.messages import Command, State
+from quadriga.shared.robots.conventions import N_JOINTS, Array
+from quadriga.shared.robots.motions import Motion, posture_at, way_down
 
 LOWER: Final = "lower"  # of `world.lost_command`
 _SECONDS: Final = 1.5  # from the stand to the ground

@@ -12,6 +12,8 @@ from dataclasses import replace
 from typing import Final
 
 from quadriga.plant.end import End
+from quadriga.shared import codes
+from quadriga.shared.about import ABOUT
 from quadriga.shared.bus.diagnostics import CLOCK_REMEDY, PACE_LIMIT, ClockOffset, MemberAnswer
 from quadriga.shared.bus.discovery import ask, ask_clock, read_about, start_together
 from quadriga.shared.bus.membership import lead
@@ -20,10 +22,8 @@ from quadriga.shared.bus.session import HERE, Answers, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError
 from quadriga.shared.members import LEADS, has_lead
+from quadriga.shared.messages import Status
 from quadriga.shared.runtime.clock import monotonic_ns, sleep, wall_ns, wall_offset
-from quadriga.shared.wire import codes
-from quadriga.shared.wire.about import ABOUT
-from quadriga.shared.wire.messages import Status
 
 _TICK_NS: Final = 1_000_000
 _LEAST_GAP_NS: Final = _TICK_NS // 2  # between the beginnings of two ticks

@@ -14,6 +14,7 @@ from quadriga.plant.realtime import run_realtime
 from quadriga.plant.server import PlantServer
 from quadriga.plant.team_time import team_time
 from quadriga.plant.words import listen_to_estops, listen_to_words
+from quadriga.shared import codes
 from quadriga.shared.bus.discovery import await_agents, join, start_together
 from quadriga.shared.bus.liveness import Loss, loss_error
 from quadriga.shared.bus.process_info import ProcessInfo
@@ -21,13 +22,12 @@ from quadriga.shared.bus.session import Bus
 from quadriga.shared.config.sections import BRIDGED, Config
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.members import plant_name
-from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.runtime.collector import end_collection
 from quadriga.shared.runtime.scheduling import leave_priority, take_priority
 from quadriga.shared.runtime.signals import interruptible, stop_on_signals
-from quadriga.shared.wire import codes
-from quadriga.shared.wire.topics import COMMAND
+from quadriga.shared.topics import COMMAND
 
 _PAUSE: Final = 0.002  # s, between two looks of a simulated robot's plant that waits
 
@@ -53,7 +53,7 @@ PlantFactory = Callable[[Config, tuple[str, ...]], Plant]
 def run(
     config: Config, build: PlantFactory, robot: str = "", stopped: Callable[[], bool] | None = None
 ) -> None:
-    """Be the plant until `world.seconds` are over, a robot has fallen, or it is stopped.
+    """Be the plant until `world.duration` are over, a robot has fallen, or it is stopped.
 
     The others learn of the end from the event `stop`, and from the absence of the process that
     drives time.

@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Protocol
 
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.wire.messages import Command, Event, State, Status, Truth
+from quadriga.shared.messages import Command, Event, State, Status, Truth
 
 
 class Plant(Protocol):

@@ -12,11 +12,11 @@ from quadriga.plant.late import FRESH, HOLD, Lateness, hold_joints
 from quadriga.plant.pace import TeamPace
 from quadriga.plant.server import PlantServer
 from quadriga.plant.team_time import plant_gone
+from quadriga.shared import codes
 from quadriga.shared.bus.session import HERE
+from quadriga.shared.messages import Command
 from quadriga.shared.runtime.clock import Rate
-from quadriga.shared.wire import codes
-from quadriga.shared.wire.messages import Command
-from quadriga.shared.wire.topics import SAMPLE_MS
+from quadriga.shared.topics import SAMPLE_MS
 
 TICK: Final = 1e-3  # s
 _LOOK_MS: Final = 100  # between two looks at the link to the router

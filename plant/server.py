@@ -13,27 +13,19 @@ from quadriga.plant.lost import LostCommands
 from quadriga.plant.protocol import Plant
 from quadriga.plant.team_time import TeamTime
 from quadriga.plant.words import NO_WORDS, Words
+from quadriga.shared import codes
 from quadriga.shared.bus.liveness import LossTimer, find_lost_link
 from quadriga.shared.bus.membership import members
 from quadriga.shared.bus.session import HERE, Bus
+from quadriga.shared.codec import encode, truncate_text
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.members import SIM
-from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.messages import Clock, Command, Event, Reset, SafeStop, Status, format_event
+from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic
-from quadriga.shared.wire import codes
-from quadriga.shared.wire.codec import encode, truncate_text
-from quadriga.shared.wire.messages import (
-    Clock,
-    Command,
-    Event,
-    Reset,
-    SafeStop,
-    Status,
-    format_event,
-)
-from quadriga.shared.wire.topics import CLOCK, EVENT, POSTURE, STATE, STATUS, TRUTH
+from quadriga.shared.topics import CLOCK, EVENT, POSTURE, STATE, STATUS, TRUTH
 
 _TOLD_AFTER: Final = 5.0  # s; a process looks for a router that is gone at least every 4 s
 FALL_LINGER_MS: Final = 1000  # world time that is still shown after the first simulated fall
@@ -97,7 +89,7 @@ class PlantServer:
         # for nobody, and are not what gets lost when somebody is slow.
         self._put_event = bus.publisher(EVENT.key(team), urgent=realtime)
         self._periods = periods(config)
-        self._last_tick = round(config.world.seconds * 1000)
+        self._last_tick = round(config.world.duration * 1000)
         self._fallen: set[str] = set()
         self._invalid: dict[str, int] = {}  # by robot, as last announced
         self._published = -1  # newest tick whose states are out
@@ -210,7 +202,7 @@ class PlantServer:
             return End(codes.FALLEN, f"fall of {', '.join(fallen)}")
         if self._stop:
             return End(codes.STOPPED, self._stop)
-        return End(codes.TIME_OVER, "end of world.seconds")
+        return End(codes.TIME_OVER, "end of world.duration")
 
     def _hear(self, words: Words) -> None:
         """Obey what people have said; an emergency stop outranks its release."""

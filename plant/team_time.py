@@ -13,14 +13,14 @@ from collections.abc import Collection, Sequence
 from typing import Final
 
 from quadriga.plant.end import End
+from quadriga.shared import codes
+from quadriga.shared.codec import decode, envelope
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
 from quadriga.shared.members import has_lead, plant_name
-from quadriga.shared.robot.conventions import robot_names
-from quadriga.shared.wire import codes
-from quadriga.shared.wire.codec import decode, envelope
-from quadriga.shared.wire.messages import Clock, Event
-from quadriga.shared.wire.topics import CLOCK, COMMAND, EVENT, STATE
+from quadriga.shared.messages import Clock, Event
+from quadriga.shared.robots.conventions import robot_names
+from quadriga.shared.topics import CLOCK, COMMAND, EVENT, STATE
 
 _LOOKS: Final = 10  # in real time one each sample, until a plant that is not there is given up
 _JUMP_MS: Final = 5000  # no plant of a team that still walks is so far ahead

@@ -7,10 +7,10 @@ from contextlib import suppress
 from typing import Final, NamedTuple
 
 from quadriga.shared.bus.session import Arrival, Bus
+from quadriga.shared.codec import decode
 from quadriga.shared.errors import MessageError
-from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.messages import EStop, LiveFault, Message, Reset, SafeStop
-from quadriga.shared.wire.topics import ESTOP, LIVE_FAULT, RESET, STOP
+from quadriga.shared.messages import EStop, LiveFault, Message, Reset, SafeStop
+from quadriga.shared.topics import ESTOP, LIVE_FAULT, RESET, STOP
 
 _UNREADABLE: Final = "unreadable"
 _KINDS: Final = {ESTOP: EStop, RESET: Reset, STOP: SafeStop, LIVE_FAULT: LiveFault}

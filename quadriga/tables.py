@@ -11,7 +11,7 @@ from rich.table import Table as RichTable
 from rich.text import Text
 
 from quadriga.shared.printable import printable, printable_line
-from quadriga.shared.robot.conventions import OUTPUTS
+from quadriga.shared.robots.conventions import OUTPUTS
 from quadriga.table_layout import TablePart, is_prose, lay_out, least_widths, total
 
 NOTHING: Final = "–"

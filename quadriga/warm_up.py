@@ -58,7 +58,7 @@ def _rehearse_agent(config: Config) -> None:
     from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
     from quadriga.agents.rehearsal import rehearse
     from quadriga.agents.time_grid import first_step, horizon_stance
-    from quadriga.shared.robot.conventions import N_OUTPUTS
+    from quadriga.shared.robots.conventions import N_OUTPUTS
 
     planner = replace(config.planner, kind="distributed", exchanges=0)
     pair = replace(config, team=replace(config.team, robots=_ROBOTS), planner=planner)

@@ -1,7 +1,7 @@
 """The command line of a controller of one's own: how it is read, filled in and told apart.
 
 Any program that speaks `state` and `command` may be the agent of each robot, see
-docs/tutorials/own_controller.md. The key `team.controller` says how it is started.
+docs/tutorials/own_controller.md. The key `team.agent_command` says how it is started.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Final
 
 from quadriga.shared.errors import ConfigError
 
-KEY: Final = "team.controller"
+KEY: Final = "team.agent_command"
 # What stands in braces in the command line, and is filled in for each robot; the program finds the
 # same in its environment, under this prefix and in capitals.
 PLACES: Final = ("robot", "team", "config", "endpoint", "mode", "listen")

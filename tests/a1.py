@@ -15,10 +15,10 @@ from quadriga.agents.controller.memory import FilterState
 from quadriga.agents.planner import planner_qp
 from quadriga.agents.planner.planner_qp import PlannerProblem
 from quadriga.shared.config.sections import PlannerConfig
-from quadriga.shared.robot import pinocchio_model
-from quadriga.shared.robot.a1 import A1
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.wire.messages import State
+from quadriga.shared.messages import State
+from quadriga.shared.robots import pinocchio_model
+from quadriga.shared.robots.a1 import A1
+from quadriga.shared.robots.conventions import Array
 
 GEOMETRY: Final = A1.geometry
 WEIGHT: Final = A1.weight

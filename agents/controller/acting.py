@@ -42,7 +42,7 @@ from quadriga.agents.controller.trunk_feedback import (
 )
 from quadriga.agents.controller.whole_body.problem import Goal, with_mu
 from quadriga.agents.controller.whole_body.solution import solve_closed_form
-from quadriga.shared.robot.conventions import N_FORCES, N_LEGS, Array
+from quadriga.shared.robots.conventions import N_FORCES, N_LEGS, Array
 from quadriga.shared.runtime.jit import compiled
 
 

@@ -19,8 +19,8 @@ from quadriga.agents.controller.trunk_feedback import (
 )
 from quadriga.agents.controller.whole_body.problem import N_WEIGHTS, Weights
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import N_JOINTS, Array
-from quadriga.shared.robot.torque_speed import MotorCurves, motor_curves
+from quadriga.shared.robots.conventions import N_JOINTS, Array
+from quadriga.shared.robots.torque_speed import MotorCurves, motor_curves
 from quadriga.shared.runtime.jit import compiled
 
 

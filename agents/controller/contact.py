@@ -18,7 +18,7 @@ from quadriga.agents.controller.foot_load import Flags
 from quadriga.agents.controller.memory import FeetMemory
 from quadriga.agents.controller.schedule import GaitPhase
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.jit import compiled
 
 _EARLIEST_TOUCHDOWN = 0.5  # of swing: before this a load is the foot still leaving the ground

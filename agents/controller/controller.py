@@ -32,10 +32,10 @@ from quadriga.agents.controller.whole_body.problem import (
 )
 from quadriga.agents.controller.whole_body.solution import finish
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.robot.torque_speed import motor_curves
+from quadriga.shared.messages import State
+from quadriga.shared.robots.conventions import Array
+from quadriga.shared.robots.torque_speed import motor_curves
 from quadriga.shared.runtime.record import record
-from quadriga.shared.wire.messages import State
 
 # The numbers of a task's row behind the deviation: v, wz, height, feedforward, …
 _NUMBERS: Final = struct.Struct(f"={TASK_SIZE - TASK.v.start}d")

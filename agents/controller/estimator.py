@@ -18,10 +18,10 @@ from quadriga.agents.controller.maths.rotation import cross, rotation_matrix
 from quadriga.agents.controller.memory import FilterState
 from quadriga.agents.controller.readings import Readings
 from quadriga.shared.config.sections import EstimatorConfig
-from quadriga.shared.robot.conventions import GRAVITY, Array
-from quadriga.shared.robot.spec import Geometry, RobotSpec
+from quadriga.shared.messages import State, Truth
+from quadriga.shared.robots.conventions import GRAVITY, Array
+from quadriga.shared.robots.spec import Geometry, RobotSpec
 from quadriga.shared.runtime.jit import compiled
-from quadriga.shared.wire.messages import State, Truth
 
 # Variances of a known state: position, velocity, four feet; m², m²/s², m².
 _KNOWN: Final = (1e-6, 1e-4, 1e-5, 1e-5, 1e-5, 1e-5)

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from quadriga.agents.controller.maths.leg_reaction import LegMotion, foot_forces, reaction_torques
 from quadriga.agents.controller.maths.rows import places, row_size
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import N_JOINTS, N_LEGS, Array
-from quadriga.shared.robot.spec import Geometry
+from quadriga.shared.robots.conventions import N_JOINTS, N_LEGS, Array
+from quadriga.shared.robots.spec import Geometry
 from quadriga.shared.runtime.jit import compiled
 
 _LEAST_SPREAD = 8.0  # N, standard deviation of the load from which on it shows a sensor's scale

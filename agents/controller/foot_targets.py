@@ -18,7 +18,7 @@ from quadriga.agents.controller.swing import (
     swing_reference,
 )
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import GRAVITY, Array, Leg
+from quadriga.shared.robots.conventions import GRAVITY, Array, Leg
 from quadriga.shared.runtime.jit import compiled
 
 _SHORTEST = 0.1  # m, how near to the hip a foot is lifted

@@ -9,7 +9,7 @@ import numpy as np
 from quadriga.agents.controller.schedule import GaitPhase
 from quadriga.agents.controller.sensed import FeetState
 from quadriga.shared.config.sections import ControllerConfig
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.jit import compiled
 
 _SETTLED = 0.2  # of a half cycle: before this a foot may still be landing

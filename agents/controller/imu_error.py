@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from quadriga.agents.controller.readings import Readings, with_imu
-from quadriga.shared.robot.conventions import GRAVITY, Array
+from quadriga.shared.robots.conventions import GRAVITY, Array
 from quadriga.shared.runtime.jit import compiled
 
 _LIMIT: Final = 0.5  # m/s²

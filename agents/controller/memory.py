@@ -11,7 +11,7 @@ import numpy as np
 
 from quadriga.agents.controller.foot_load import FOOT_LOAD, FOOT_LOAD_SIZE
 from quadriga.agents.controller.maths.rows import places, row_size
-from quadriga.shared.robot.conventions import N_FORCES, N_LEGS, Array
+from quadriga.shared.robots.conventions import N_FORCES, N_LEGS, Array
 from quadriga.shared.runtime.jit import compiled
 from quadriga.shared.runtime.record import record
 

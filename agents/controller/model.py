@@ -8,9 +8,9 @@ import pinocchio as pin
 from quadriga.agents.controller.maths.links import link_table
 from quadriga.agents.controller.maths.rigid_body import RigidBodyTerms, rigid_body_terms
 from quadriga.agents.controller.payload_estimate import add_load
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.robot.pinocchio_model import build_pinocchio_model
-from quadriga.shared.robot.spec import RobotSpec
+from quadriga.shared.robots.conventions import Array
+from quadriga.shared.robots.pinocchio_model import build_pinocchio_model
+from quadriga.shared.robots.spec import RobotSpec
 
 
 def _single_rigid_body(model: pin.Model, q_joint: Array) -> tuple[Array, Array]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from quadriga.agents.controller.maths.links import LINK
-from quadriga.shared.robot.conventions import GRAVITY, Array
+from quadriga.shared.robots.conventions import GRAVITY, Array
 from quadriga.shared.runtime.jit import compiled
 
 _MOST = 25.0  # kg; two robots' weight is no load that legs carry

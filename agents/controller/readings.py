@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.messages import State
+from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.jit import compiled
-from quadriga.shared.wire.messages import State
 
 # Where `State.row` keeps what.
 _Q_JOINT: Final = State.CUTS["q_joint"]

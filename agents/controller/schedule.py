@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from quadriga.agents.controller.maths.rows import places
-from quadriga.shared.robot.conventions import N_LEGS, Array
+from quadriga.shared.robots.conventions import N_LEGS, Array
 from quadriga.shared.runtime.jit import compiled
 from quadriga.shared.runtime.record import record
 

@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 
 from quadriga.agents.controller.maths.rows import places, row_size
 from quadriga.agents.controller.memory import Memory
-from quadriga.shared.robot.conventions import N_JOINTS, N_LEGS, N_OUTPUTS, Array
+from quadriga.shared.robots.conventions import N_JOINTS, N_LEGS, N_OUTPUTS, Array
 from quadriga.shared.runtime.jit import compiled
 from quadriga.shared.runtime.record import record
 

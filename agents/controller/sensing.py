@@ -39,8 +39,8 @@ from quadriga.agents.controller.readings import Readings, readings_of
 from quadriga.agents.controller.schedule import SCHEDULE, phase_of
 from quadriga.agents.controller.sensed import SENSED, feet_of, trunk_of
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.robot.spec import N_GEOMETRY, Geometry
+from quadriga.shared.robots.conventions import Array
+from quadriga.shared.robots.spec import N_GEOMETRY, Geometry
 from quadriga.shared.runtime.jit import compiled
 
 

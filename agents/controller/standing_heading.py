@@ -13,7 +13,7 @@ import numpy as np
 
 from quadriga.agents.controller.maths.rotation import wrap_angle
 from quadriga.agents.controller.memory import MEMORY
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.jit import compiled
 
 SETTLED_S: Final = 2.0  # of standing, from which on the feet tell; until then the IMU is better

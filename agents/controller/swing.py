@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from quadriga.agents.controller.maths.rotation import heading
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.jit import compiled
 
 _PLANE_DONE = 0.9  # of swing: the foot comes down vertically

@@ -6,8 +6,8 @@ from typing import Final
 
 import numpy as np
 
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.robot.torque_speed import MotorCurves, torque_range
+from quadriga.shared.robots.conventions import Array
+from quadriga.shared.robots.torque_speed import MotorCurves, torque_range
 from quadriga.shared.runtime.jit import compiled
 
 _LEAST: Final = 0.25  # of the limit: a QP without any torque has no solution, and motors limit too

@@ -9,7 +9,7 @@ import numpy as np
 from quadriga.agents.controller.maths.rotation import cross, heading, roll_pitch_yaw, wrap_angle
 from quadriga.agents.controller.sensed import TrunkState
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import GRAVITY, Array
+from quadriga.shared.robots.conventions import GRAVITY, Array
 from quadriga.shared.runtime.jit import compiled
 
 _Z_LIMIT = 0.05  # m·s, height integrator

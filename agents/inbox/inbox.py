@@ -19,14 +19,14 @@ from quadriga.agents.plausibility import (
 from quadriga.agents.step_io import Inputs
 from quadriga.agents.teammates import concerns_agents
 from quadriga.agents.time_grid import step_ms
+from quadriga.shared.codec import decode
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
 from quadriga.shared.members import OPERATOR, PLANNER, SIM
+from quadriga.shared.messages import EStop, Event, Message, Plan, Reference, State, Truth
 from quadriga.shared.planner_kinds import find_kind
-from quadriga.shared.robot.conventions import Array, robot_names
-from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.messages import EStop, Event, Message, Plan, Reference, State, Truth
-from quadriga.shared.wire.topics import (
+from quadriga.shared.robots.conventions import Array, robot_names
+from quadriga.shared.topics import (
     ESTOP,
     EVENT,
     MEASUREMENT,

@@ -10,8 +10,8 @@ from quadriga.agents.planning.interface import NOTHING, Expected
 from quadriga.agents.step_io import Inputs
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import OPERATOR, SIM
-from quadriga.shared.wire.messages import Consumed, Message
-from quadriga.shared.wire.topics import (
+from quadriga.shared.messages import Consumed, Message
+from quadriga.shared.topics import (
     EVENT,
     MEASUREMENT,
     PLAN,

@@ -35,7 +35,7 @@ from quadriga.agents.time_grid import distinct_steps, horizon_stance, phase_of
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorFileError
 from quadriga.shared.planner_kinds import find_kind
-from quadriga.shared.robot.conventions import OUTPUTS, Array
+from quadriga.shared.robots.conventions import OUTPUTS, Array
 
 _SAME: Final = 1e-6  # relative: other machines have other last digits, other costs differ by more
 # Fields of the meta that must be as configured, beside the controller's keys.

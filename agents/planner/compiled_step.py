@@ -16,7 +16,7 @@ from quadriga.agents.planner.optimality import Residuals, is_optimal
 from quadriga.agents.planner.planner_qp import PlannerProblem
 from quadriga.agents.planner.qp_solver import CompiledQp
 from quadriga.agents.plausibility import OUTPUT_MAX
-from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
+from quadriga.shared.robots.conventions import N_FORCES, N_OUTPUTS, Array
 from quadriga.shared.runtime.jit import compiled
 
 

@@ -47,7 +47,7 @@ from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.time_grid import distinct_steps, horizon_stance, phase_of
 from quadriga.shared.config.sections import Config
 from quadriga.shared.planner_kinds import find_kind
-from quadriga.shared.robot.conventions import N_OUTPUTS, Array
+from quadriga.shared.robots.conventions import N_OUTPUTS, Array
 
 OWN: Final = "own"  # values of planner.cost
 TEAM: Final = "team"

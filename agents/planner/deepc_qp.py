@@ -30,7 +30,7 @@ from quadriga.agents.predictor.deepc import Reduction
 from quadriga.agents.predictor.episode import Layout
 from quadriga.shared.config.sections import PlannerConfig
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot.conventions import N_LEGS, Array
+from quadriga.shared.robots.conventions import N_LEGS, Array
 
 Index = NDArray[np.int64]
 

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from quadriga.agents.planner.optimality import largest_residuals
 from quadriga.agents.planner.row_solve import solve, subtract
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.jit import compiled
 
 _MOST: Final = 12  # solutions on faces; a cycle ends here

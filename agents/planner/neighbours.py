@@ -18,10 +18,10 @@ from quadriga.agents.gait import nominal_forces, scheduled_stance
 from quadriga.agents.planner.peer_memory import PeerHistory, PeerMemory, remember
 from quadriga.agents.time_grid import horizon_stance, patience, sample_starts, step_ms
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array, robot_names
+from quadriga.shared.messages import Measurement, Plan
+from quadriga.shared.robots.conventions import N_FORCES, N_OUTPUTS, Array, robot_names
 from quadriga.shared.runtime.record import record
-from quadriga.shared.wire.messages import Measurement, Plan
-from quadriga.shared.wire.topics import MEASUREMENT, SAMPLE_MS
+from quadriga.shared.topics import MEASUREMENT, SAMPLE_MS
 
 FRESH: Final = "fresh"  # the newest plan that may be used: that of step k−1
 SHIFTED: Final = "shifted"  # an older one, shifted by its age

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from quadriga.agents.planner.planner_qp import PlannerProblem
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.jit import compiled
 
 # An answer with larger residuals is not used, whatever status the solver reports.

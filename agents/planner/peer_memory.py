@@ -9,9 +9,9 @@ from typing import TypeVar
 from quadriga.agents.plausibility import is_plausible
 from quadriga.agents.time_grid import patience, step_ms
 from quadriga.shared.config.sections import Config
+from quadriga.shared.messages import Measurement, Message, Plan
 from quadriga.shared.runtime.record import record
-from quadriga.shared.wire.messages import Measurement, Message, Plan
-from quadriga.shared.wire.topics import SAMPLE_MS
+from quadriga.shared.topics import SAMPLE_MS
 
 M = TypeVar("M", bound=Message)
 K = TypeVar("K", int, tuple[int, int])

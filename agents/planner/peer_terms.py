@@ -19,7 +19,7 @@ from quadriga.agents.planner.neighbours import PeerData, PeerSelection
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.time_grid import horizon_stance, phase_of, place_in, walking_steps
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import N_OUTPUTS, Array
+from quadriga.shared.robots.conventions import N_OUTPUTS, Array
 from quadriga.shared.runtime.record import record
 
 

@@ -33,10 +33,10 @@ from quadriga.agents.planner.qp_solver import (
 from quadriga.agents.plausibility import are_plausible_outputs
 from quadriga.agents.predictor.predictor import Predictor, check_sizes
 from quadriga.agents.time_grid import horizon_stance, phase_of, place_in, walking_steps
+from quadriga.shared.codes import with_detail
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.record import record
-from quadriga.shared.wire.codes import with_detail
 
 IMPLAUSIBLE: Final = "implausible"
 

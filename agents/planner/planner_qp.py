@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from quadriga.agents.gait import nominal_forces
 from quadriga.shared.config.sections import PlannerConfig
-from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
+from quadriga.shared.robots.conventions import N_FORCES, N_OUTPUTS, Array
 
 NO_BOUNDS = "none"
 

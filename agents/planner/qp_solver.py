@@ -22,7 +22,7 @@ from quadriga.agents.planner.foot_limits import (
 )
 from quadriga.agents.planner.optimality import MAX_STATIONARITY, Residuals, is_optimal, residuals
 from quadriga.agents.planner.planner_qp import PlannerProblem
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 
 SOLVED: Final = "solved"
 NOMINAL: Final = "nominal"  # code of a plan's status: no solution, hence the nominal forces

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.jit import compiled
 
 

@@ -26,10 +26,10 @@ from quadriga.agents.predictor.deepc import reduce
 from quadriga.agents.predictor.episode import Episode
 from quadriga.agents.predictor.predictor import Predictor, check_sizes
 from quadriga.agents.time_grid import horizon_stance, phase_of, walking_steps
+from quadriga.shared.codes import with_detail
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.wire.codes import with_detail
+from quadriga.shared.robots.conventions import Array
 
 Collected = Callable[[], Sequence[Episode]]
 Formulation = Callable[[int, NDArray[np.bool_]], Condensed]  # of contact phase and stance

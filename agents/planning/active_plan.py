@@ -12,12 +12,12 @@ from quadriga.agents.planner.qp_solver import NOMINAL
 from quadriga.agents.plausibility import OUTPUT_MAX
 from quadriga.agents.predictor.episode import commanded_outputs
 from quadriga.agents.time_grid import sample_starts, step_ms
+from quadriga.shared.codes import with_detail
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import N_FORCES, N_LEGS, N_OUTPUTS, Array
+from quadriga.shared.messages import Plan, Reference
+from quadriga.shared.robots.conventions import N_FORCES, N_LEGS, N_OUTPUTS, Array
 from quadriga.shared.runtime.record import record
-from quadriga.shared.wire.codes import with_detail
-from quadriga.shared.wire.messages import Plan, Reference
-from quadriga.shared.wire.topics import SAMPLE_MS
+from quadriga.shared.topics import SAMPLE_MS
 
 _NO_FORCE = np.zeros(12)
 # A planner's own plans keep to deviation_max: the share and N on top are for its solver.

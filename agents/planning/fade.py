@@ -10,8 +10,8 @@ import numpy as np
 from quadriga.agents.planner.planner import PlanResult
 from quadriga.agents.planner.qp_solver import SOLVED
 from quadriga.shared.config.sections import PlannerConfig
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.wire.messages import Plan
+from quadriga.shared.messages import Plan
+from quadriga.shared.robots.conventions import Array
 
 FADED: Final = "faded"  # status of a plan that is applied in part
 
@@ -25,7 +25,7 @@ def fade_factor(config: PlannerConfig, error: Array) -> float:
         config: the range.
         error: present outputs less the desired ones, shape (6,).
     """
-    share = 2.0 - float(np.maximum.reduce(np.abs(error) / _ranges(config.fade)))
+    share = 2.0 - float(np.maximum.reduce(np.abs(error) / _ranges(config.trust_range)))
     return min(1.0, share) if share > 0.0 else 0.0  # 0 if it is NaN
 
 

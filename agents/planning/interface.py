@@ -9,8 +9,8 @@ from typing import Final, Protocol, TypeVar
 from quadriga.agents.modes import Mode
 from quadriga.agents.planner.qp_solver import SolvedQp
 from quadriga.agents.planning.active_plan import ActivePlan
+from quadriga.shared.messages import Measurement, Plan, Reference
 from quadriga.shared.runtime.record import record
-from quadriga.shared.wire.messages import Measurement, Plan, Reference
 
 S = TypeVar("S")
 REFUSED: Final = "refused_by_planner"  # counter: messages whose content cannot be meant

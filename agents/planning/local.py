@@ -26,12 +26,12 @@ from quadriga.agents.planning.operator_references import base_of_window
 from quadriga.agents.planning.window import build_planner_inputs, is_gapless
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.time_grid import exchange_ms, first_step, owed_from, patience, step_ms
+from quadriga.shared.codes import with_detail
 from quadriga.shared.config.sections import Config
+from quadriga.shared.messages import Measurement, Reference
 from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.runtime.record import record
-from quadriga.shared.wire.codes import with_detail
-from quadriga.shared.wire.messages import Measurement, Reference
-from quadriga.shared.wire.topics import SAMPLE_MS
+from quadriga.shared.topics import SAMPLE_MS
 
 WINDOW_GAP: Final = "window_gap"  # counter: no plan, a sample of the robot's own is missing
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from quadriga.agents.predictor.episode import output_base
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.wire.messages import Reference
-from quadriga.shared.wire.topics import SAMPLE_MS
+from quadriga.shared.messages import Reference
+from quadriga.shared.robots.conventions import Array
+from quadriga.shared.topics import SAMPLE_MS
 
 AHEAD_MS: Final = 1000  # how far ahead of the present a message may speak
 _KEPT_MS = 2000  # long enough for the windows of the oldest plan that may still be used

@@ -16,9 +16,9 @@ from quadriga.agents.planning.operator_references import remember_references
 from quadriga.shared.config.reference_trace import trace_of
 from quadriga.shared.config.sections import Config, ReferenceConfig
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.wire.messages import Reference
-from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS
+from quadriga.shared.messages import Reference
+from quadriga.shared.robots.conventions import Array
+from quadriga.shared.topics import REFERENCE_EPOCH_MS
 
 _NAMES: Final = ("vx", "vy", "wz", "height")
 _SHARE: Final = 0.1  # of the range of what may be asked for, in an epoch: all of it in a second

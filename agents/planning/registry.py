@@ -26,9 +26,9 @@ from quadriga.agents.planning.nominal import NominalPlanning
 from quadriga.agents.planning.operator_references import reference_at
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config
+from quadriga.shared.messages import Plan
 from quadriga.shared.planner_kinds import find_kind, load_builder
 from quadriga.shared.runtime.record import record
-from quadriga.shared.wire.messages import Plan
 
 _NONE: Final = np.zeros((0, 0))
 

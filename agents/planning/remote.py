@@ -21,9 +21,9 @@ from quadriga.agents.predictor.episode import commanded_outputs
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.time_grid import first_step, owed_from, patience, step_ms
 from quadriga.shared.config.sections import Config
+from quadriga.shared.messages import Measurement, Plan
 from quadriga.shared.runtime.record import record
-from quadriga.shared.wire.messages import Measurement, Plan
-from quadriga.shared.wire.topics import SAMPLE_MS
+from quadriga.shared.topics import SAMPLE_MS
 
 
 @record

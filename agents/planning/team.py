@@ -17,9 +17,9 @@ from quadriga.agents.planning.window import build_planner_inputs
 from quadriga.agents.plausibility import is_plausible
 from quadriga.agents.time_grid import first_step, step_ms
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import robot_names
-from quadriga.shared.wire.messages import Measurement, Plan, Reference
-from quadriga.shared.wire.topics import MEASUREMENT, SAMPLE_MS
+from quadriga.shared.messages import Measurement, Plan, Reference
+from quadriga.shared.robots.conventions import robot_names
+from quadriga.shared.topics import MEASUREMENT, SAMPLE_MS
 
 Windows = Mapping[str, tuple[Measurement, ...]]
 _AHEAD_MS: Final = MEASUREMENT.max_age_ms  # of the team's time, of a sample that is believed

@@ -8,8 +8,8 @@ from quadriga.agents.planner.planner import PlannerInputs
 from quadriga.agents.planning.operator_references import base_of_window, reference_at
 from quadriga.agents.predictor.episode import commanded_outputs, output_base
 from quadriga.shared.config.sections import Config
-from quadriga.shared.wire.messages import Measurement, Reference
-from quadriga.shared.wire.topics import SAMPLE_MS
+from quadriga.shared.messages import Measurement, Reference
+from quadriga.shared.topics import SAMPLE_MS
 
 
 def is_gapless(samples: tuple[Measurement, ...], count: int, end: int) -> bool:

@@ -21,7 +21,7 @@ from quadriga.agents.predictor.hankel import mosaic
 from quadriga.agents.predictor.plant import Data, PlantPredictor, as_numbers, as_signal, unstack
 from quadriga.agents.predictor.regression import scaled_blocks
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 
 _FAR: Final = 1e30  # DAQP's infinity
 _STATUS: Final = MappingProxyType({-1: "infeasible", -2: "cycling", -4: "iteration limit"})

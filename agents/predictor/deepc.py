@@ -24,7 +24,7 @@ from scipy import linalg
 from quadriga.agents.predictor.episode import Episode, Layout, team_layout
 from quadriga.agents.predictor.hankel import gram
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 
 Index = NDArray[np.int64]
 

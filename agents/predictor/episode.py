@@ -10,9 +10,9 @@ import numpy as np
 from quadriga.agents.predictor.hankel import windows
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.conventions import N_FORCES, N_LEGS, N_OUTPUTS, Array
-from quadriga.shared.robot.robots import ROBOTS
-from quadriga.shared.wire.messages import Reference
+from quadriga.shared.messages import Reference
+from quadriga.shared.robots.conventions import N_FORCES, N_LEGS, N_OUTPUTS, Array
+from quadriga.shared.robots.registry import ROBOTS
 
 U_SCALE: Final = 10.0  # N
 Y_SCALE: Final = np.array([0.005, 0.1, 0.1, 0.02, 0.02, 0.2])  # m, m/s, m/s, rad, rad, rad/s

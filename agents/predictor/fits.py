@@ -21,8 +21,8 @@ from quadriga.agents.predictor.periodic import (
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.predictor.regression import Penalty, fit_blocks
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.wire.topics import SAMPLE_MS
+from quadriga.shared.robots.conventions import Array
+from quadriga.shared.topics import SAMPLE_MS
 
 _COMMANDED: Final = (1, 2, 5)  # vx, vy, wz: outputs whose base moves with the reference
 

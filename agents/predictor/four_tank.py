@@ -15,7 +15,7 @@ import numpy as np
 from quadriga.agents.predictor.control import PlanWeights
 from quadriga.agents.predictor.plant import Data
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 
 _A: Final = np.array(
     [

@@ -23,8 +23,8 @@ from quadriga.agents.time_grid import gait_phase, horizon_stance, phase_of, walk
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.planner_kinds import find_kind
-from quadriga.shared.robot.conventions import N_LEGS, N_OUTPUTS, OUTPUTS, Array
-from quadriga.shared.wire.topics import SAMPLE_MS
+from quadriga.shared.robots.conventions import N_LEGS, N_OUTPUTS, OUTPUTS, Array
+from quadriga.shared.topics import SAMPLE_MS
 
 LEFT_OUT: Final = 0.02  # of the effect of own forces: a smaller effect of peers is as good as none
 UNDERSTATED: Final = 1.25  # slope above which the effect is certainly too small

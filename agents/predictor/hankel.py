@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 
 
 def hankel(signal: Array, L: int) -> Array:

@@ -18,10 +18,10 @@ from quadriga.agents.predictor.periodic import DEGREE, polynomials, spread_over_
 from quadriga.agents.predictor.predictor import PredictorMeta
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorFileError
-from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
+from quadriga.shared.robots.conventions import N_FORCES, N_OUTPUTS, Array
 from quadriga.shared.runtime.atomic import atomic_write
 from quadriga.shared.runtime.npz import UNREADABLE, as_counts, as_measured, open_npz
-from quadriga.shared.wire.topics import SAMPLE_MS
+from quadriga.shared.topics import SAMPLE_MS
 
 # What a true response depends on, as far as a predictor's meta says it.
 _TEAM: Final = (

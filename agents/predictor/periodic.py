@@ -21,7 +21,7 @@ from scipy import linalg
 from quadriga.agents.predictor.episode import Layout
 from quadriga.agents.predictor.regression import factorise
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 
 FACTORS: Final = ("response", "free", "wrench")  # arrays of a periodic predictor
 DEGREE: Final = 3  # of the polynomials of the phase in a response

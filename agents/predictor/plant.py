@@ -33,7 +33,7 @@ from quadriga.agents.predictor.periodic import (
 from quadriga.agents.predictor.regression import Penalty, excitation, fit_blocks
 from quadriga.agents.predictor.store import name_damage, read_archive, write_archive
 from quadriga.shared.errors import PredictorError, did_you_mean
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 
 KINDS: Final = ("pinv", "ridge", "periodic")
 _MOST: Final = 1e100

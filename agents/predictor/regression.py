@@ -13,7 +13,7 @@ from scipy import linalg
 from quadriga.agents.predictor.episode import Layout, scales
 from quadriga.agents.predictor.hankel import columns, gram
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 
 Index = NDArray[np.int64]
 # Rounding turns eigenvalues of the Gram matrix that should be zero into up to 1e-16 · (number of

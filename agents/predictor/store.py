@@ -18,7 +18,7 @@ from quadriga.agents.predictor.gates import GateReport
 from quadriga.agents.predictor.periodic import FACTORS, PeriodicFactors
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.shared.errors import PredictorError, PredictorFileError, name_file_errors
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.atomic import atomic_write
 from quadriga.shared.runtime.npz import UNREADABLE, open_npz
 

@@ -25,7 +25,7 @@ def load_config(
 
     Example:
         >>> config = quadriga.load_config("team.toml", set={"world.seed": 7})
-        >>> print(config.world.seconds, config.team.robots)
+        >>> print(config.world.duration, config.team.robots)
 
     Args:
         path: a TOML file, as `quadriga config` writes one; None: no file.

@@ -17,10 +17,10 @@ from quadriga.recordings.summary import kept_summary, summary_of
 from quadriga.recordings.traces import read_traces
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import RecordingError, did_you_mean
+from quadriga.shared.messages import Event
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.conventions import robot_names
-from quadriga.shared.wire.messages import Event
+from quadriga.shared.robots.conventions import robot_names
 
 if TYPE_CHECKING:  # what draws, replays and predicts is imported by who asks for it
     from quadriga.agents.predictor.predictor import Predictor

@@ -18,7 +18,7 @@ from quadriga.shared.config.write import config_sha256
 from quadriga.shared.recording.reader import Recording
 
 # Of the team what its world depends on.
-_TEAM: Final = ("robots", "robot", "yokes", "spacing", "plant", "plants")
+_TEAM: Final = ("robots", "robot", "yokes", "spacing", "plant", "plant_per_robot")
 
 
 def build_trial(run: Run) -> TrialOutcome:

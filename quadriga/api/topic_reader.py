@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from quadriga.api.topic_arrays import TopicArrays, TopicField
 from quadriga.export.layout import list_owners, name_entries, name_numbers
+from quadriga.shared.codec import decode
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
+from quadriga.shared.messages import Message
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.messages import Message
-from quadriga.shared.wire.topics import Topic, find_topic
+from quadriga.shared.topics import Topic, find_topic
 
 _BATCH: Final = 4096  # messages that are in memory as such
 _UNIT: Final = re.compile(r" \[([^\[\]]*)\]$")  # at the end of what a single value is

@@ -13,8 +13,8 @@ from quadriga.recordings.traces import demanded_outputs, read_traces
 from quadriga.recordings.tracking import track_outputs
 from quadriga.shared.config.sections import Config
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.conventions import OUTPUTS, robot_names
-from quadriga.shared.wire.topics import MEASUREMENT, PLAN, REFERENCE, TRUTH
+from quadriga.shared.robots.conventions import OUTPUTS, robot_names
+from quadriga.shared.topics import MEASUREMENT, PLAN, REFERENCE, TRUTH
 
 if TYPE_CHECKING:
     from pandas import DataFrame

@@ -46,7 +46,7 @@ def walk(
         scenario: the name of a scenario, see `quadriga scenarios`, or a TOML file.
         seed: of the world (`world.seed`).
         robots: how many (`team.robots`).
-        seconds: of world time (`world.seconds`).
+        seconds: of world time (`world.duration`).
         set: values of any keys by `section.key`, see docs/configuration.md; they win.
         out: the run folder, without a recording; None: `runs/<date>-<time>`.
         config: a TOML file, or a configuration of `quadriga.load_config`.
@@ -60,7 +60,7 @@ def walk(
         RecordingError: nothing could be recorded.
         KeyboardInterrupt: this process was interrupted; no process of the team is left.
     """
-    named = {"world.seed": seed, "team.robots": robots, "world.seconds": seconds}
+    named = {"world.seed": seed, "team.robots": robots, "world.duration": seconds}
     keys = {name: value for name, value in named.items() if value is not None} | dict(set or {})
     wanted = _read_report(report)
     base = config if isinstance(config, Config) or config is None else Path(config)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from quadriga.shared.robot.colours import N_ROBOT_COLOURS, robot_colour
+from quadriga.shared.robots.colours import N_ROBOT_COLOURS, robot_colour
 
 # The page's style sheet has the same names, with brighter colours where the page is dark. The
 # robots' colours stand for robots alone.

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 
 TIME: Final = "time [s]"
 DEGREES: Final = (180.0 / math.pi, "°")  # beside rad and rad/s

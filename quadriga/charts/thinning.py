@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadriga.charts.panels import Curve
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 
 
 def find_spells(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:

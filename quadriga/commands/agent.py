@@ -24,12 +24,12 @@ def add(add_command: AddCommand) -> None:
 
 def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     """Run the agent until the walk is over, or become the controller in its place."""
-    from quadriga.shared.robot.conventions import robot_names
+    from quadriga.shared.robots.conventions import robot_names
 
     names = robot_names(config.team.robots)
     if arguments.robot not in names:
         raise ConfigError("--robot", repr(arguments.robot), f"one of {', '.join(names)}")
-    if config.team.controller:
+    if config.team.agent_command:
         _become_controller(arguments, config)
     from quadriga.agents import process  # compiled code, which a controller does not wait for
     from quadriga.identification.central_planner import collected_of

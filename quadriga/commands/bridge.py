@@ -35,7 +35,7 @@ def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     """Bridge the robot until the walk is over."""
     from quadriga.bridges.plant import build_bridge
     from quadriga.plant import process
-    from quadriga.shared.robot.conventions import robot_names
+    from quadriga.shared.robots.conventions import robot_names
     from quadriga.shared.runtime.signals import stop_on_signals
 
     team, names = config.team, robot_names(config.team.robots)

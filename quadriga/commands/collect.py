@@ -18,7 +18,7 @@ def run(_arguments: argparse.Namespace, config: Config, _given: Given) -> int:
 
     from quadriga.identification.cache import data_path
     from quadriga.identification.predictors import ensure_data
-    from quadriga.shared.wire.topics import SAMPLE_MS
+    from quadriga.shared.topics import SAMPLE_MS
 
     dataset = ensure_data(config, Console(stderr=True))
     seconds = 1e-3 * SAMPLE_MS * sum(episode.samples for episode in dataset.training)

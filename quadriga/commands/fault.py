@@ -77,8 +77,8 @@ def run(arguments: argparse.Namespace, config: Config, given: Given) -> int:
     for name in ("tries", "jobs"):
         if getattr(arguments, name) < 1:
             raise ConfigError(f"--{name}", str(getattr(arguments, name)), "at least 1")
-    if "seconds" not in given.get("world", {}):  # then a walk lasts no longer than its fault needs
-        config = replace(config, world=replace(config.world, seconds=_SHORTEST_S))
+    if "duration" not in given.get("world", {}):  # then a walk lasts no longer than its fault needs
+        config = replace(config, world=replace(config.world, duration=_SHORTEST_S))
     faults = select_faults(names, config)
     folder = make_run_dir(arguments.out)
     seeds = range(config.world.seed, config.world.seed + arguments.tries)

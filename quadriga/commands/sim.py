@@ -16,7 +16,7 @@ def add(add_command: AddCommand) -> None:
         "--robot",
         default="",
         metavar="NAME",
-        help="the plant of this robot alone, where team.plants is 'each'",
+        help="the plant of this robot alone, where team.plant_per_robot is true",
     )
     command.add_argument(
         "--as",
@@ -42,7 +42,7 @@ def add(add_command: AddCommand) -> None:
 def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     """Run the plant until the walk is over."""
     from quadriga.plant import process
-    from quadriga.shared.robot.conventions import robot_names
+    from quadriga.shared.robots.conventions import robot_names
     from quadriga.team.plants import plant_factory
 
     if arguments.emulated:
@@ -50,11 +50,12 @@ def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     for given, name in ((arguments.hung, "--hung"), (arguments.truth, "--truth")):
         if given:
             raise ConfigError(name, "no --as", "--as with a kind of robot")
-    robot, plants = arguments.robot, config.team.plants
-    permitted = robot_names(config.team.robots) if plants == "each" else ("",)
+    robot, own = arguments.robot, config.team.plant_per_robot
+    permitted = robot_names(config.team.robots) if own else ("",)
     if robot not in permitted:
-        expected = f"one of {', '.join(permitted)}" if plants == "each" else "nothing"
-        raise ConfigError("--robot", repr(robot), expected, f"team.plants is {plants!r}")
+        expected = f"one of {', '.join(permitted)}" if own else "nothing"
+        cause = f"team.plant_per_robot is {str(own).lower()}"
+        raise ConfigError("--robot", repr(robot), expected, cause)
     process.run(config, plant_factory(config), robot)
     return 0
 

@@ -86,7 +86,7 @@ def _report(arguments: argparse.Namespace) -> Report:
 
 def _driven(config: Config, given: Given) -> Config:
     """The configuration of a team that is driven by hand."""
-    world = {"mode": "realtime", "seconds": _DRIVEN_SECONDS}
+    world = {"mode": "realtime", "duration": _DRIVEN_SECONDS}
     changes: dict[str, Any] = {
         name: value for name, value in world.items() if name not in given.get("world", {})
     }

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from quadriga.shared.errors import ProcessError
-from quadriga.shared.robot.conventions import N_JOINTS
-from quadriga.shared.wire.messages import Command, State
+from quadriga.shared.messages import Command, State
+from quadriga.shared.robots.conventions import N_JOINTS
 
 CAUSE = "see docs/messages.md#command"
 

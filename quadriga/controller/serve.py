@@ -12,11 +12,11 @@ from quadriga.agents.shell import answer_states
 from quadriga.controller.motor_command import build_command
 from quadriga.controller.stepped import Step, SteppedController
 from quadriga.controller.task import ControllerTask, read_task
+from quadriga.shared.codec import decode, encode
 from quadriga.shared.errors import QuadrigaError
+from quadriga.shared.messages import State
 from quadriga.shared.printable import printable_line
 from quadriga.shared.runtime.signals import stop_on_signals
-from quadriga.shared.wire.codec import decode, encode
-from quadriga.shared.wire.messages import State
 
 _FAILED: Final = 1
 _INTERRUPTED: Final = 130

@@ -31,12 +31,12 @@ from quadriga.agents.planning.operator_references import reference_at, remember_
 from quadriga.agents.step_io import Inputs, Outputs
 from quadriga.controller.motor_command import CAUSE
 from quadriga.plant.late import damp_joints
+from quadriga.shared.codes import with_detail
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ProcessError
+from quadriga.shared.messages import Command, Reference, State
 from quadriga.shared.runtime.record import record
-from quadriga.shared.wire.codes import with_detail
-from quadriga.shared.wire.messages import Command, Reference, State
-from quadriga.shared.wire.topics import REFERENCE, REFERENCE_EPOCH_MS
+from quadriga.shared.topics import REFERENCE, REFERENCE_EPOCH_MS
 
 Step = Callable[[State, Reference], Command]
 """From what the robot measures and what is asked of it to its motor command."""

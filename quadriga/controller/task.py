@@ -12,7 +12,7 @@ from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.controller_line import ENVIRONMENT
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.robots.conventions import robot_names
 
 _ROBOT: Final = f"{ENVIRONMENT}ROBOT"
 _CONFIG: Final = f"{ENVIRONMENT}CONFIG"

@@ -11,8 +11,8 @@ from typing import Any, Final
 import numpy as np
 
 from quadriga.desk.robots import Said
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.wire.messages import Truth
+from quadriga.shared.messages import Truth
+from quadriga.shared.robots.conventions import Array
 from quadriga.sim_server.emulator.process import LOST
 
 FELL: Final = 0.8  # rad, tilt of a trunk: a robot that lies down or sinks stays flatter

@@ -10,7 +10,7 @@ from quadriga.desk.tables import build_fault_table, build_walk_table
 from quadriga.desk.trial import WITHOUT
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.robots import ROBOTS
+from quadriga.shared.robots.registry import ROBOTS
 from quadriga.tables import Table
 from quadriga.team.run_folder import CONFIG
 from quadriga.team.trial_rows import read_rows

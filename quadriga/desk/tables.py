@@ -10,7 +10,7 @@ import numpy as np
 
 from quadriga.desk.faults import BY_NAME, NO_FAULT
 from quadriga.desk.trial import WITHOUT
-from quadriga.shared.wire.codes import TIME_OVER, code_of
+from quadriga.shared.codes import TIME_OVER, code_of
 from quadriga.tables import NOTHING, Table
 
 # Figure, its name, its factor and digits.

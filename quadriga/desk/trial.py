@@ -26,17 +26,17 @@ from quadriga.desk.robots import SimulatedRobots
 from quadriga.identification.predictors import ensure_predictor
 from quadriga.recordings.readable import open_readable
 from quadriga.recordings.summary import RECORDING
+from quadriga.shared.codec import decode
 from quadriga.shared.config.sections import BRIDGED, SIMULATED, Config
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.errors import ProcessError, RecordingError
 from quadriga.shared.members import SIM, plant_name
+from quadriga.shared.messages import Event, Status, Truth
 from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.runtime.atomic import write_text
-from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.messages import Event, Status, Truth
-from quadriga.shared.wire.topics import EVENT, STATUS, topic_of
+from quadriga.shared.topics import EVENT, STATUS, topic_of
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import Launch, ProcessSpec, process_table, router_row
 from quadriga.team.run_folder import CONFIG
@@ -117,7 +117,7 @@ class _Trial:
                 os.kill(pid, sent)
         for order in self._fault.orders:
             self._since = self._robots.order(f"{self._patient} {order}")
-        longest = self._config.world.seconds + self._config.bridge.stand_s + _AFTER_S
+        longest = self._config.world.duration + self._config.bridge.stand_s + _AFTER_S
         self._robots.wait_until(self._is_over, longest)
         for pid in pids:
             with suppress(OSError):
@@ -139,7 +139,7 @@ class _Trial:
         tilts = {name: traces[name].tilt(self._since) for name in self._names}
         figures: dict[str, Any] = {}
         if self._fault is NO_FAULT:
-            end = self._begun + 1000.0 * self._config.world.seconds
+            end = self._begun + 1000.0 * self._config.world.duration
             steady = self._begun + 1000.0 * _STEADY_S
             figures = {n: describe_walk(traces[n], steady, end) for n in self._names}
         return {
@@ -252,7 +252,7 @@ def walk_without_bridges(config: Config, seed: int, folder: Path) -> dict[str, A
     folder.mkdir(parents=True, exist_ok=True)
     config = replace(
         config,
-        team=replace(config.team, plant=SIMULATED, plants="one"),
+        team=replace(config.team, plant=SIMULATED, plant_per_robot=False),
         world=replace(config.world, seed=seed),
         bus=replace(config.bus, endpoint=free_endpoint()),
     )
@@ -261,7 +261,7 @@ def walk_without_bridges(config: Config, seed: int, folder: Path) -> dict[str, A
         launch.watch(lambda: False)
     recording = Recording(folder / RECORDING)
     names, traces = robot_names(config.team.robots), traces_of(list(recording.messages(Truth)))
-    end = 1000.0 * config.world.seconds
+    end = 1000.0 * config.world.duration
     plant = list(recording.messages(Status, SIM))[-1]
     tilts = {name: trace.tilt(0.0) for name, trace in zip(names, traces, strict=True)}
     return {

@@ -9,6 +9,7 @@ from quadriga.doctor.machine import check_machine, need_of
 from quadriga.doctor.readings import read_machine
 from quadriga.doctor.report import DoctorReport, MemberReport
 from quadriga.doctor.trust import look_at_certificates, try_certificate
+from quadriga.shared.about import About
 from quadriga.shared.bus.diagnostics import (
     BAD,
     DECISIVE,
@@ -32,7 +33,6 @@ from quadriga.shared.errors import BusError, ConfigError
 from quadriga.shared.members import DOCTOR, SIM, Member
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.runtime.installed import project_version
-from quadriga.shared.wire.about import About
 
 LINK: Final = "link"
 _LINK_TIMEOUT: Final = 2.0  # s, in which a link to those that are there has come about
@@ -102,7 +102,7 @@ def _look_at_team(config: Config, me: About) -> tuple[TeamView, Diagnosis]:
 
 def _compare_clocks(bus: Bus, config: Config, view: TeamView) -> TeamView:
     """The same view, with those answers of plants that tell best what their clocks show."""
-    if config.team.plants == "one" or config.world.mode != "realtime":
+    if not config.team.plant_per_robot or config.world.mode != "realtime":
         return view
     plants = [member.name for member in processes(config) if member.role.name == SIM]
     alone = [name for name in plants if len(view.answers.get(name, ())) == 1]

@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from quadriga.shared.about import READY
 from quadriga.shared.bus.diagnostics import BAD, CLOCK_OFF, NOT_REALTIME, TeamView, diagnose
 from quadriga.shared.members import DOCTOR, ROUTER, Member
-from quadriga.shared.wire.about import READY
 
 WELL: Final = "well"  # how the line of who is healthy begins
 UNWELL: Final = "not well"

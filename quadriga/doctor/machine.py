@@ -111,7 +111,7 @@ def need_of(config: Config, *, spread: bool) -> MachineNeed:
         spread=spread,
         busy=_BUSY if spread else busy,
         count=_BUSY if spread else len(team),
-        recorded=round(config.team.robots * config.world.seconds * _ROBOT_BYTES),
+        recorded=round(config.team.robots * config.world.duration * _ROBOT_BYTES),
     )
 
 

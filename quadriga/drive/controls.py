@@ -16,14 +16,14 @@ from quadriga.drive.charge import InCharge
 from quadriga.drive.driver_words import DriverWord
 from quadriga.drive.wish import standing
 from quadriga.shared.bus.session import Arrival, Bus
+from quadriga.shared.codec import decode, encode
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
-from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.messages import EStop, Event, Message, Reset, Resume, SafeStop, Status
+from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic_ns
-from quadriga.shared.wire.codec import decode, encode
-from quadriga.shared.wire.messages import EStop, Event, Message, Reset, Resume, SafeStop, Status
-from quadriga.shared.wire.topic import Topic
-from quadriga.shared.wire.topics import ESTOP, EVENT, RESET, RESUME, STATUS, STOP
+from quadriga.shared.topic import Topic
+from quadriga.shared.topics import ESTOP, EVENT, RESET, RESUME, STATUS, STOP
 
 _MOVES: Final = frozenset((words.GO_ON, words.RESET))  # has robots get up, or walk
 _MOST_EVENTS: Final = 1000  # since the last emergency stop; more can only be a flood
@@ -49,7 +49,7 @@ class DriveControls:
         team = config.team.name
         self.drivable = drivable
         self.robots = robot_names(config.team.robots)
-        self.plant_each = config.team.plants == "each"
+        self.plant_each = config.team.plant_per_robot
         self.time: Callable[[], tuple[int, int]] = lambda: (0, 0)
         self.asked = standing(config)
         self._lock = Lock()

@@ -11,9 +11,9 @@ from typing import Final, NamedTuple
 from quadriga.agents.modes import STAND, STOPPED, STOPPING, WALK
 from quadriga.drive.charge import InCharge, why_stand
 from quadriga.drive.wish import Wish
+from quadriga.shared.codes import with_detail
+from quadriga.shared.messages import Status
 from quadriga.shared.runtime.record import record
-from quadriga.shared.wire.codes import with_detail
-from quadriga.shared.wire.messages import Status
 
 DRIVER: Final = "driver: "  # begins the reason of a stop that driving on ends
 _AGAIN_MS: Final = 200  # after which a word is said once more that not all have followed

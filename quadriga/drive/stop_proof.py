@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 from typing import Final
 
 from quadriga.agents.modes import ESTOP
-from quadriga.shared.wire import codes
-from quadriga.shared.wire.messages import Event, Status
+from quadriga.shared import codes
+from quadriga.shared.messages import Event, Status
 
 PLANT: Final = "plant"
 _AT_REST: Final = frozenset((codes.ESTOPPED, codes.ROBOT_STOPPED))  # what plants announce

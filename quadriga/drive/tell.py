@@ -10,7 +10,7 @@ from quadriga.drive.controls import DriveControls, now_ms
 from quadriga.drive.driver_words import NEWS
 from quadriga.drive.stop_proof import unconfirmed
 from quadriga.drive.wish import NAMES, limits
-from quadriga.shared.wire.messages import Status
+from quadriga.shared.messages import Status
 
 _PATIENCE_MS: Final = 500  # in which all must have stopped
 

@@ -20,6 +20,7 @@ from quadriga.identification.rollout import Rollout
 from quadriga.pictures.frames import CLIP
 from quadriga.pictures.render import render
 from quadriga.recordings.metadata import build_metadata
+from quadriga.shared.codec import encode
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.planner_kinds import find_kind
@@ -27,8 +28,7 @@ from quadriga.shared.recording.metadata import RECORDING
 from quadriga.shared.recording.writer import RecordingWriter
 from quadriga.shared.runtime.atomic import atomic_write, write_text
 from quadriga.shared.runtime.places import SOURCE
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.topics import SAMPLE_MS, STATE, TRUTH
+from quadriga.shared.topics import SAMPLE_MS, STATE, TRUTH
 from quadriga.team.operator import references_of
 from quadriga.team.scenarios import LABEL, description, names, path
 
@@ -89,7 +89,7 @@ def command_of(scenario: str) -> tuple[str, ...]:
 
 def configure(scenario: str) -> Config:
     """The configuration of that walk."""
-    keys = {LABEL: scenario, "world.seed": _SEED, "world.seconds": float(_SECONDS)}
+    keys = {LABEL: scenario, "world.seed": _SEED, "world.duration": float(_SECONDS)}
     unplanned = {"planner.kind": "none"} if scenario in _UNPLANNED else {}
     return load(path(scenario), keys | unplanned)
 

@@ -135,9 +135,9 @@ def _check_worlds(configs: Mapping[Group, Config]) -> None:
     for group, config in configs.items():
         if not config.team.one_world:
             raise ConfigError(
-                f"{group.scenario}: team.plant, team.plants",
-                f"{config.team.plant!r}, {config.team.plants!r}",
-                "'mujoco', 'one'",
+                f"{group.scenario}: team.plant, team.plant_per_robot",
+                f"{config.team.plant!r}, {str(config.team.plant_per_robot).lower()}",
+                "'mujoco', false",
                 "trials are walked in one simulated world",
             )
     for config in {(c.team, c.world): c for c in configs.values()}.values():

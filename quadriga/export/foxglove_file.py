@@ -21,8 +21,8 @@ from quadriga.export.team_scene import PERIOD_MS, path_ticks
 from quadriga.export.tracking import NAMES, Tracking
 from quadriga.pictures.poses import Poses, read_poses, truth_ticks
 from quadriga.recordings.traces import read_traces
-from quadriga.shared.wire.messages import Event, Measurement, Message, Truth
-from quadriga.shared.wire.topics import MEASUREMENT, PLAN, TRUTH
+from quadriga.shared.messages import Event, Measurement, Message, Truth
+from quadriga.shared.topics import MEASUREMENT, PLAN, TRUTH
 
 
 def write_foxglove(source: Source, out: Path, on_tick: TickReached) -> tuple[Path, ...]:

@@ -10,10 +10,10 @@ from typing import Any, Final
 from quadriga.charts.colours import PALETTE
 from quadriga.export.scene import WORLD
 from quadriga.export.source import Source
-from quadriga.shared.robot.colours import robot_colour
-from quadriga.shared.robot.conventions import Leg, robot_names
+from quadriga.shared.robots.colours import robot_colour
+from quadriga.shared.robots.conventions import Leg, robot_names
 from quadriga.shared.runtime.atomic import write_text
-from quadriga.shared.wire.topics import MEASUREMENT, PLAN, STATUS, TRUTH
+from quadriga.shared.topics import MEASUREMENT, PLAN, STATUS, TRUTH
 
 _OUTPUTS: Final = (  # title, path below `tracking.true.`, reference, factor's modifier
     ("z [m]", "z", "height", ""),

@@ -11,8 +11,8 @@ import numpy as np
 
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.yokes import yoke_pairs
-from quadriga.shared.robot.conventions import Array, robot_names
-from quadriga.shared.wire.messages import Message
+from quadriga.shared.messages import Message
+from quadriga.shared.robots.conventions import Array, robot_names
 
 _SAMPLES: Final = "N"  # the axis of the horizon: one row per entry
 

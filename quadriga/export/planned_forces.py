@@ -6,8 +6,8 @@ import numpy as np
 
 from quadriga.recordings.applied_plans import join_applied_samples
 from quadriga.recordings.traces import Traces
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.wire.topics import SAMPLE_MS
+from quadriga.shared.robots.conventions import Array
+from quadriga.shared.topics import SAMPLE_MS
 
 
 class PlannedForces:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from quadriga.recordings.dead_reckoning import follow_speeds
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 
 
 def predict_path(y: Array, position: Array, yaw: float) -> Array:

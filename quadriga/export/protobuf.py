@@ -11,7 +11,7 @@ import numpy as np
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 
 from quadriga.export.layout import MessageLayout
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 
 _PACKAGE: Final = "quadriga"
 _SAMPLES: Final = "samples"

@@ -14,10 +14,10 @@ from quadriga.export.source import WARNINGS
 from quadriga.recordings.applied_plans import join_applied_samples
 from quadriga.recordings.traces import Traces, demanded_outputs
 from quadriga.recordings.truth import Ticks
-from quadriga.shared.robot.colours import robot_colour, to_rgb
-from quadriga.shared.robot.conventions import OUTPUTS, Array, Leg
-from quadriga.shared.wire.messages import Status
-from quadriga.shared.wire.topics import SAMPLE_MS
+from quadriga.shared.messages import Status
+from quadriga.shared.robots.colours import robot_colour, to_rgb
+from quadriga.shared.robots.conventions import OUTPUTS, Array, Leg
+from quadriga.shared.topics import SAMPLE_MS
 
 EVENTS: Final = "/events"
 FACTORS: Final = np.array([1.0, 1.0, 1.0, *np.rad2deg([1.0, 1.0, 1.0])])  # of OUTPUTS

@@ -27,8 +27,8 @@ from quadriga.pictures.poses import Poses, read_poses
 from quadriga.recordings.traces import Traces
 from quadriga.recordings.truth import Ticks
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.colours import robot_rgb
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.colours import robot_rgb
+from quadriga.shared.robots.conventions import Array
 
 WORLD: Final = "/world"
 _THICK, _THIN, _LINE = 0.006, 0.0035, 0.004  # m, radii

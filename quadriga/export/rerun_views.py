@@ -10,7 +10,7 @@ from quadriga.export.rerun_curves import EVENTS, TITLES
 from quadriga.export.rerun_log import TIME
 from quadriga.export.rerun_scene import WORLD
 from quadriga.recordings.traces import Traces
-from quadriga.shared.robot.conventions import OUTPUTS, Leg
+from quadriga.shared.robots.conventions import OUTPUTS, Leg
 
 _ORDER: Final = (0, 3, 1, 4, 2, 5)  # of the outputs, two in a row: z roll, vx pitch, vy wz
 

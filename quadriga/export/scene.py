@@ -21,8 +21,8 @@ from quadriga.export.team_scene import (
 )
 from quadriga.pictures.link_mesh import LinkMesh
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.colours import Rgb, robot_rgb
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.colours import Rgb, robot_rgb
+from quadriga.shared.robots.conventions import Array
 
 WORLD: Final = "world"
 _THICK, _THIN = 0.012, 0.007  # m, shafts of true and of planned forces

@@ -8,13 +8,13 @@ from dataclasses import fields
 from typing import Final, NamedTuple
 
 from quadriga.export.layout import MessageLayout, build_layout
+from quadriga.shared.codec import decode
 from quadriga.shared.errors import MessageError
+from quadriga.shared.messages import Message
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.messages import Message
-from quadriga.shared.wire.topics import TABLE, topic_of
+from quadriga.shared.robots.conventions import Array
+from quadriga.shared.topics import TABLE, topic_of
 
 WARNINGS: Final = ("fall", "fault")  # kinds of events that are shown as warnings
 

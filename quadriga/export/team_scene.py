@@ -18,7 +18,7 @@ from quadriga.pictures.robot_shapes import HIDDEN_GROUP, dress, paint
 from quadriga.recordings.truth import Ticks
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MeshError
-from quadriga.shared.robot.conventions import Array, robot_names
+from quadriga.shared.robots.conventions import Array, robot_names
 from quadriga.sim_server.terrain.terrain import Terrain
 
 NEWTON: Final = 0.002  # m of arrow per N

@@ -10,8 +10,8 @@ from quadriga.recordings.traces import read_traces
 from quadriga.recordings.tracking import track_outputs
 from quadriga.recordings.truth import Ticks
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.conventions import OUTPUTS, Array
-from quadriga.shared.wire.topics import MEASUREMENT, PLAN, REFERENCE, TRUTH
+from quadriga.shared.robots.conventions import OUTPUTS, Array
+from quadriga.shared.topics import MEASUREMENT, PLAN, REFERENCE, TRUTH
 
 NAMES: Final = (
     *(f"{what}.{output}" for what in ("true", "estimated", "planned") for output in OUTPUTS),

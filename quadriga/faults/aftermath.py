@@ -49,7 +49,7 @@ def await_end(scene: FaultScene, begun: float | None = None) -> None:
             others took to leave is noted, and what they said.
     """
     launch, lost_world = scene.launch, bool(scene.struck) and not _has_world(scene)
-    deadline = monotonic() + _START_S + scene.config.world.seconds + _SLACK_S
+    deadline = monotonic() + _START_S + scene.config.world.duration + _SLACK_S
     while _has_world(scene) and monotonic() < deadline:
         sleep(_LOOK_S)
     # All others leave by themselves once the world has ended.

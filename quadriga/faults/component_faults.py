@@ -10,7 +10,7 @@ from typing import Final
 
 from quadriga.faults.fault import Draw, SetStage, Stage, TeamFault
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.robots.conventions import robot_names
 from quadriga.sim_server.world.faults import KINDS, build_components, parse_faults
 
 _SHORT_S: Final = 0.5  # of a component that is faulty for a while
@@ -27,7 +27,9 @@ def _stage(fault: str, seconds: float | None) -> SetStage:
     def stage(config: Config, draw: Draw, _folder: Path) -> Iterator[Stage]:
         text = f"{draw.robot}/{fault} {1e-3 * draw.tick:g}"
         text += "" if seconds is None else f" {seconds:g}"
-        world = replace(config.world, faults=text, seconds=config.world.seconds + (seconds or 0.0))
+        world = replace(
+            config.world, faults=text, duration=config.world.duration + (seconds or 0.0)
+        )
         yield Stage(replace(config, world=world))
 
     return stage
@@ -57,7 +59,7 @@ def given_component_fault(text: str, config: Config) -> TeamFault:
     @contextmanager
     def stage(config: Config, _draw: Draw, _folder: Path) -> Iterator[Stage]:
         after_s = 0.0 if fault.stop is None else 1e-3 * (fault.stop - fault.start)
-        world = replace(config.world, faults=text, seconds=config.world.seconds + after_s)
+        world = replace(config.world, faults=text, duration=config.world.duration + after_s)
         yield Stage(replace(config, world=world))
 
     return TeamFault(text, fault.detail, stage, realtime=False, given=(fault.robot, fault.start))

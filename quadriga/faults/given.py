@@ -14,7 +14,7 @@ from quadriga.faults.fault import REALTIME_ROBOTS, Draw, Lasting, Stage, TeamFau
 from quadriga.faults.link_faults import LINK_WORDS, LINKS
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError, did_you_mean
-from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.robots.conventions import robot_names
 from quadriga.sim_server.world.faults import KINDS, build_components
 
 GRAMMAR: Final = "NAME or [ROBOT/]PART KIND, with --at S [--for S]"
@@ -121,7 +121,7 @@ def _lasting(found: TeamFault, fault: TeamFault, seconds: float) -> TeamFault:
 
     @contextmanager
     def stage(config: Config, draw: Draw, folder: Path) -> Iterator[Stage]:
-        world = replace(config.world, seconds=config.world.seconds + seconds)
+        world = replace(config.world, duration=config.world.duration + seconds)
         with lasting(seconds)(replace(config, world=world), draw, folder) as made:
             yield made._replace(detail=f"for {seconds:g} s")
 

@@ -73,8 +73,8 @@ def _with_bystander(kind: str, lasts: float | None = None) -> SetStage:
     @contextmanager
     def stage(config: Config, draw: Draw, _folder: Path) -> Iterator[Stage]:
         beside = _Bystander(kind)
-        seconds = max(config.world.seconds, 1e-3 * draw.tick + _FULL_S)
-        world, bus = replace(config.world, seconds=seconds), replace(config.bus, mode="client")
+        seconds = max(config.world.duration, 1e-3 * draw.tick + _FULL_S)
+        world, bus = replace(config.world, duration=seconds), replace(config.bus, mode="client")
         try:
             yield Stage(replace(config, world=world, bus=bus), beside, lasts=lasts)
         finally:

@@ -8,12 +8,12 @@ from typing import Any, Final, NamedTuple
 
 from quadriga.recordings.gaps import missing_ticks
 from quadriga.recordings.traces import Traces
+from quadriga.shared import codes
 from quadriga.shared.config.sections import Config
+from quadriga.shared.messages import Event, Status
 from quadriga.shared.recording.metadata import END
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.wire import codes
-from quadriga.shared.wire.messages import Event, Status
-from quadriga.shared.wire.topics import STATE
+from quadriga.shared.topics import STATE
 
 _WALKS: Final = "walk"
 _STANDS: Final = ("stand", "damping", "estop")  # a robot that walks no more

@@ -54,8 +54,8 @@ def _stage(process: str, signals: _Signals) -> SetStage:
         # A router that nobody replaces is waited for in vain; and who stands still behind a router
         # might hold it up, but only once all that lies between them is full.
         bus = replace(config.bus, mode="client", reconnect_timeout=_RECONNECT_S)
-        seconds = max(config.world.seconds, 1e-3 * draw.tick + _FULL_S)
-        world = replace(config.world, seconds=seconds)
+        seconds = max(config.world.duration, 1e-3 * draw.tick + _FULL_S)
+        world = replace(config.world, duration=seconds)
         yield Stage(replace(config, bus=bus, world=world), strike, lasts=lasts)
 
     return stage

@@ -59,14 +59,14 @@ def _restarted(process: str, down_s: float = _DOWN_S) -> SetStage:
     @contextmanager
     def stage(config: Config, draw: Draw, _folder: Path) -> Iterator[Stage]:
         back_s = down_s + _BACK_S + (_RISE_S if process == OWN else 0.0)
-        seconds = max(config.world.seconds, 1e-3 * draw.tick + back_s)
+        seconds = max(config.world.duration, 1e-3 * draw.tick + back_s)
         bus = replace(config.bus, mode="client") if process == ROUTER else config.bus
         yield Stage(
             replace(
                 config,
                 bus=bus,
                 team=replace(config.team, auto_resume=True),
-                world=replace(config.world, seconds=seconds),
+                world=replace(config.world, duration=seconds),
             ),
             _Restart(process, down_s),
             robot=robot_of(process, draw),

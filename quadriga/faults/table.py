@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from quadriga.faults.catalogue import BY_NAME
-from quadriga.shared.wire.codes import TIME_OVER, code_of
+from quadriga.shared.codes import TIME_OVER, code_of
 from quadriga.tables import NOTHING, Table
 
 _COLUMNS: Final = (

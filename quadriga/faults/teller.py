@@ -9,14 +9,14 @@ from threading import Thread
 from typing import Final
 
 from quadriga.faults.fault import Stage
+from quadriga.shared import codes
 from quadriga.shared.bus.session import HERE, Bus
+from quadriga.shared.codec import decode, encode
 from quadriga.shared.errors import MessageError
 from quadriga.shared.members import RECORDER
+from quadriga.shared.messages import Clock, Event
 from quadriga.shared.runtime.clock import monotonic
-from quadriga.shared.wire import codes
-from quadriga.shared.wire.codec import decode, encode
-from quadriga.shared.wire.messages import Clock, Event
-from quadriga.shared.wire.topics import CLOCK, INJECTED, RECEIVED
+from quadriga.shared.topics import CLOCK, INJECTED, RECEIVED
 
 # World time from the word to the fault, ms: by then it is on the disk, whoever is killed. It is
 # said before, so that nothing is sent between the reading of the clock and the fault itself.

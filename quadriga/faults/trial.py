@@ -26,11 +26,11 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.errors import ProcessError, RecordingError
 from quadriga.shared.members import LAUNCHER, SIM, has_lead
-from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.messages import parse_events
+from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.runtime.atomic import write_text
 from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns
 from quadriga.shared.runtime.scheduling import go_first, leave_priority
-from quadriga.shared.wire.messages import parse_events
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import Launch, process_table, router_row
 from quadriga.team.run_folder import CONFIG
@@ -90,7 +90,7 @@ def _walk_config(config: Config, fault: TeamFault, draw: Draw) -> Config:
         config.world,
         seed=draw.seed,
         mode="realtime" if fault.realtime else "lockstep",
-        seconds=max(config.world.seconds, 1e-3 * draw.tick + _AFTER_S),
+        duration=max(config.world.duration, 1e-3 * draw.tick + _AFTER_S),
     )
     bus = replace(config.bus, endpoint=free_endpoint())
     return replace(config, world=world, bus=bus, recorder=replace(config.recorder, enabled=True))

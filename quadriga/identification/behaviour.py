@@ -18,7 +18,7 @@ from typing import Final
 
 import numpy as np
 
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.arithmetic import arithmetic_digest
 from quadriga.shared.runtime.atomic import write_text
 from quadriga.shared.runtime.imports import followed_files

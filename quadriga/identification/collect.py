@@ -18,10 +18,10 @@ from quadriga.identification.dataset import Dataset
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.config.sections import Config, WorldConfig
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.conventions import N_FORCES, Array, robot_names
-from quadriga.shared.wire.messages import Reference
-from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS as EPOCH_MS
-from quadriga.shared.wire.topics import SAMPLE_MS
+from quadriga.shared.messages import Reference
+from quadriga.shared.robots.conventions import N_FORCES, Array, robot_names
+from quadriga.shared.topics import REFERENCE_EPOCH_MS as EPOCH_MS
+from quadriga.shared.topics import SAMPLE_MS
 from quadriga.workers import run_each
 
 _LEAST: Final = 2000  # samples, however few the rule asks for

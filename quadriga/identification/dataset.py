@@ -14,7 +14,7 @@ from quadriga.agents.predictor.hankel import required_samples
 from quadriga.agents.predictor.regression import excitation
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError, PredictorFileError
-from quadriga.shared.robot.conventions import N_FORCES, Array
+from quadriga.shared.robots.conventions import N_FORCES, Array
 from quadriga.shared.runtime.atomic import atomic_write
 from quadriga.shared.runtime.npz import UNREADABLE, open_npz
 

@@ -34,10 +34,10 @@ from quadriga.identification.dataset import Dataset, check_excitation
 from quadriga.identification.predictors import ensure_data, fit_now, judge_now, reason, refusal
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.conventions import OUTPUTS, Array, robot_names
+from quadriga.shared.robots.conventions import OUTPUTS, Array, robot_names
 from quadriga.shared.runtime.atomic import write_text
 from quadriga.shared.runtime.clock import monotonic
-from quadriga.shared.wire.topics import SAMPLE_MS
+from quadriga.shared.topics import SAMPLE_MS
 from quadriga.tables import (
     LABELS,
     NOTHING,

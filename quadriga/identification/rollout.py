@@ -19,9 +19,9 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.controller_line import KEY as CONTROLLER
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.members import PLANNER
-from quadriga.shared.robot.conventions import Array, robot_names
+from quadriga.shared.messages import Event, Measurement, Plan, Reference
+from quadriga.shared.robots.conventions import Array, robot_names
 from quadriga.shared.runtime.blas import use_one_blas_thread
-from quadriga.shared.wire.messages import Event, Measurement, Plan, Reference
 from quadriga.sim_server.world.world import World
 
 Plans = tuple[tuple[str, Plan], ...]
@@ -54,10 +54,10 @@ def build_agents(
     Raises:
         ConfigError: the team's agents are a controller of one's own, a process of its own.
     """
-    if config.team.controller:
+    if config.team.agent_command:
         raise ConfigError(
             CONTROLLER,
-            repr(config.team.controller),
+            repr(config.team.agent_command),
             "'': agents that walk in this process",
             "only `quadriga walk` and campaigns start a controller of one's own",
         )

@@ -10,7 +10,7 @@ import numpy as np
 from quadriga.agents.predictor.episode import SIGNALS
 from quadriga.identification.collect import PlannedEpisode, collect_episode
 from quadriga.shared.config.load import load
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 
 _SECONDS: Final = 1.0
 _WALK: Final = {"gait.stand_ms": 100, "identification.hold": 0.2}

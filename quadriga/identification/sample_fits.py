@@ -17,7 +17,7 @@ from quadriga.agents.time_grid import sample_starts
 from quadriga.identification.behaviour import numbers
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
+from quadriga.shared.robots.conventions import N_FORCES, N_OUTPUTS, Array
 from quadriga.shared.runtime.blas import use_one_blas_thread
 
 _ROBOTS: Final = 3

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from quadriga.moving_scene.spans import Span
 from quadriga.pictures.link_mesh import LinkMeshes
-from quadriga.shared.robot.colours import robot_colour
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.colours import robot_colour
+from quadriga.shared.robots.conventions import Array
 from quadriga.view.compose import compose
 from quadriga.view.ground import read_boxes, read_surface
 from quadriga.view.mesh_groups import group_meshes

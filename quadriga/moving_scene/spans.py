@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from typing import Final
 
 from quadriga.report.timeline import TimelineEntry
+from quadriga.shared.codes import FALL
 from quadriga.shared.runtime.record import record
-from quadriga.shared.wire.codes import FALL
 
 _BEFORE_MS, _AFTER_MS = 1000, 300  # of a fall
 _MOST: Final = 10  # falls that are shown, one of each robot of the largest team

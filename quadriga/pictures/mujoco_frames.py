@@ -26,8 +26,8 @@ from quadriga.pictures.viewpoint import AZIMUTH, ELEVATION, FIELD, viewpoints
 from quadriga.shared.errors import MeshError, QuadrigaError
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.colours import robot_rgb
-from quadriga.shared.robot.conventions import Array, robot_names
+from quadriga.shared.robots.colours import robot_rgb
+from quadriga.shared.robots.conventions import Array, robot_names
 from quadriga.sim_server.terrain.relief import Stones
 
 _FORCE_SCALE: Final = 0.005  # m per N

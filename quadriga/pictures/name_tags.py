@@ -9,8 +9,8 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from quadriga.pictures.viewpoint import Viewpoint
-from quadriga.shared.robot.colours import robot_colour
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.colours import robot_colour
+from quadriga.shared.robots.conventions import Array
 
 _ABOVE: Final = 0.16  # m over the middle of the trunk
 _SIZE: Final = 20  # pixels

@@ -10,14 +10,14 @@ import mujoco
 import numpy as np
 
 from quadriga.recordings.truth import Ticks
+from quadriga.shared.codec import decode
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError, RecordingError
+from quadriga.shared.messages import State, Truth
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.conventions import Array, robot_names
-from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.messages import State, Truth
-from quadriga.shared.wire.topics import STATE, TRUTH
+from quadriga.shared.robots.conventions import Array, robot_names
+from quadriga.shared.topics import STATE, TRUTH
 from quadriga.sim_server.world.layout import NQ
 from quadriga.sim_server.world.team_model import TeamModel, build_team_model
 

@@ -9,8 +9,8 @@ from typing import Final
 import mujoco
 
 from quadriga.pictures.link_mesh import LinkMesh, LinkMeshes
-from quadriga.shared.robot.colours import robot_rgb
-from quadriga.shared.robot.conventions import FOOT_FRAMES, Leg
+from quadriga.shared.robots.colours import robot_rgb
+from quadriga.shared.robots.conventions import FOOT_FRAMES, Leg
 from quadriga.sim_server.terrain.relief import NO_CONTACT
 from quadriga.sim_server.world.robot_body import TRUNK, VISUAL_GROUP
 

@@ -20,8 +20,8 @@ from quadriga.pictures.viewpoint import Viewpoint, viewpoints
 from quadriga.shared.errors import MeshError
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.colours import robot_rgb
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.colours import robot_rgb
+from quadriga.shared.robots.conventions import Array
 from quadriga.sim_server.world.robot_body import TRUNK
 
 _FINER: Final = 2  # painted larger, then made smaller, so that edges are smooth

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from quadriga.pictures.link_mesh import Rgba
 from quadriga.shared.errors import MeshError
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 
 _MOVING: Final = ("revolute", "continuous", "prismatic")  # kinds of joints
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from quadriga.pictures.frames import FRAME
 from quadriga.pictures.poses import Poses
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 
 AZIMUTH: Final = 145.0  # deg, seen from ahead and the left of a team that walks along x
 ELEVATION: Final = -24.0  # deg

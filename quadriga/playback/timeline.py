@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 from quadriga.shared.errors import ConfigError, RecordingError
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import ChunkEntry, Recording
-from quadriga.shared.wire.topics import SAMPLE_MS, STATE, TRUTH
+from quadriga.shared.topics import SAMPLE_MS, STATE, TRUTH
 
 Remap = tuple[str, str]
 

@@ -15,7 +15,7 @@ from quadriga.shared.recording.reader import name_of
 from quadriga.shared.recording.ticks import lost_by_key
 from quadriga.shared.recording.writer import RecordingWriter
 from quadriga.shared.runtime.clock import monotonic
-from quadriga.shared.wire.topics import STATE
+from quadriga.shared.topics import STATE
 
 _RECORD: Final = 64  # bytes that a message takes at most in a file beside its payload
 

@@ -26,7 +26,7 @@ from quadriga.shared.recording.quota import LARGEST, Quota
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.runtime.scheduling import precede_ordinary, take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
-from quadriga.shared.wire.topics import EVENT
+from quadriga.shared.topics import EVENT
 
 _HEARD: Final = 3.0  # s wall, in which a team that walks is heard of
 _LOOK: Final = 0.02  # s wall between two looks for it

@@ -10,8 +10,8 @@ from quadriga.recordings.key_patterns import key_patterns
 from quadriga.shared.config.sections import TeamConfig
 from quadriga.shared.members import PLANNER, plant_name
 from quadriga.shared.recording.quota import LONGEST_KEY, MAX_FOREIGN_KEYS
-from quadriga.shared.robot.conventions import robot_names
-from quadriga.shared.wire.topics import TABLE
+from quadriga.shared.robots.conventions import robot_names
+from quadriga.shared.topics import TABLE
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,18 +11,18 @@ from quadriga.recorder.selection import KeyFilter
 from quadriga.recorder.starvation import Starvation
 from quadriga.shared.bus.liveness import LAST_PACKETS, Loss, LossTimer, find_loss
 from quadriga.shared.bus.session import Bus
+from quadriga.shared.codec import decode
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
 from quadriga.shared.members import PLANNER, plant_name
+from quadriga.shared.messages import Event
 from quadriga.shared.recording.quota import OVERSIZED
 from quadriga.shared.recording.reader import name_of
 from quadriga.shared.recording.ticks import SkippedTicks
-from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.runtime.clock import log_ns, monotonic, sleep
 from quadriga.shared.runtime.scheduling import take_priority
-from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.messages import Event
-from quadriga.shared.wire.topics import EVENT, find_topic
+from quadriga.shared.topics import EVENT, find_topic
 
 FLUSH: Final = 0.05  # s wall between two flushes: a kill loses what has come since the last
 QUIET: Final = 0.2  # s wall without a message after which nothing more is under way

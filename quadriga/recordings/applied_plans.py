@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from quadriga.shared.robot.conventions import N_FORCES, OUTPUTS, Array
-from quadriga.shared.wire.messages import Plan
-from quadriga.shared.wire.topics import SAMPLE_MS
+from quadriga.shared.messages import Plan
+from quadriga.shared.robots.conventions import N_FORCES, OUTPUTS, Array
+from quadriga.shared.topics import SAMPLE_MS
 
 
 def join_applied_samples(plans: Sequence[Plan], applied: int) -> tuple[Array, Array, Array]:

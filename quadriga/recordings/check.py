@@ -14,14 +14,14 @@ from quadriga.recordings.checks.limits import Friction, Torques
 from quadriga.recordings.checks.sequence import Ages, Gaps, Order
 from quadriga.recordings.metadata import CONTINUES, read_counts
 from quadriga.recordings.readable import open_readable
+from quadriga.shared.codec import decode
 from quadriga.shared.errors import MessageError, RecordingError
 from quadriga.shared.printable import printable_line
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.metadata import COUNTS
 from quadriga.shared.recording.reader import ChunkEntry, Recording
 from quadriga.shared.recording.recover import DamagedRecording
-from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.topics import Topic, find_topic
+from quadriga.shared.topics import Topic, find_topic
 from quadriga.tables import align_columns
 
 _WIDE = 96  # characters of a value that are shown

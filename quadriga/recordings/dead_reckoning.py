@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from quadriga.shared.robot.conventions import OUTPUTS, Array
-from quadriga.shared.wire.topics import SAMPLE_MS
+from quadriga.shared.robots.conventions import OUTPUTS, Array
+from quadriga.shared.topics import SAMPLE_MS
 
 
 def follow_speeds(place: Array, outputs: Array, seconds: float = 1e-3 * SAMPLE_MS) -> Array:

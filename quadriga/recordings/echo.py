@@ -7,11 +7,11 @@ from typing import Any, Final
 
 import numpy as np
 
+from quadriga.shared.codec import decode
 from quadriga.shared.errors import MessageError
 from quadriga.shared.printable import printable_line
 from quadriga.shared.recording.reader import ChunkEntry
-from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.topics import topic_of
+from quadriga.shared.topics import topic_of
 
 _SHORT: Final = 4  # numbers of an array that are shown
 _BYTES: Final = 24  # of what is no message

@@ -6,13 +6,13 @@ from collections import defaultdict
 from collections.abc import Sequence
 from typing import Final
 
+from quadriga.shared.codec import decode
 from quadriga.shared.errors import MessageError
 from quadriga.shared.members import LAUNCHER
+from quadriga.shared.messages import Event
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.messages import Event
-from quadriga.shared.wire.topic import Topic
-from quadriga.shared.wire.topics import AGENT_EVENT, EVENT, INJECTED, topic_of
+from quadriga.shared.topic import Topic
+from quadriga.shared.topics import AGENT_EVENT, EVENT, INJECTED, topic_of
 
 _NAMES: Final = frozenset((EVENT.name, AGENT_EVENT.name, INJECTED.name))
 

@@ -15,8 +15,8 @@ import numpy as np
 
 from quadriga.recordings.traces import Traces
 from quadriga.recordings.truth import TruthTrace
-from quadriga.shared.wire.codes import ESTOPPED, FALL, LOWERED, RESET
-from quadriga.shared.wire.messages import Event
+from quadriga.shared.codes import ESTOPPED, FALL, LOWERED, RESET
+from quadriga.shared.messages import Event
 
 _LEAVES: Final = frozenset((ESTOPPED, LOWERED, RESET))
 

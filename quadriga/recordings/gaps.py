@@ -17,10 +17,10 @@ from quadriga.agents.modes import RISING, WALK
 from quadriga.recordings.truth import Ticks
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
+from quadriga.shared.messages import Status
 from quadriga.shared.planner_kinds import find_kind
-from quadriga.shared.robot.conventions import robot_names
-from quadriga.shared.wire.messages import Status
-from quadriga.shared.wire.topics import COMMAND, MEASUREMENT, PLAN, SAMPLE_MS, STATE, TRUTH, Topic
+from quadriga.shared.robots.conventions import robot_names
+from quadriga.shared.topics import COMMAND, MEASUREMENT, PLAN, SAMPLE_MS, STATE, TRUTH, Topic
 
 Span = tuple[float, float]  # ticks from the first up to before the second
 
@@ -96,7 +96,7 @@ def _missing_of_walk(
         end: the last tick at which something is expected.
     """
     team, stand_ms, missing = config.team.name, config.gait.stand_ms, dict[str, int]()
-    if not config.team.controller:
+    if not config.team.agent_command:
         spans = _find_spans(statuses, lambda mode: mode != RISING)
         found = _recorded_ticks(ticks, key := MEASUREMENT.key(team, name))
         missing[key] = _count_missing_within(spans, found, stand_ms, SAMPLE_MS, end, unsampled)
@@ -111,7 +111,7 @@ def _missing_of_walk(
 
 def end_of_world(config: Config) -> int:
     """The last tick a run of `config` can have, ms."""
-    return round(1000 * config.world.seconds)
+    return round(1000 * config.world.duration)
 
 
 def repeated_ticks(ticks: Mapping[str, Ticks]) -> int:

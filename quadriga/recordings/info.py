@@ -12,7 +12,7 @@ from quadriga.shared.planner_kinds import absent_origin
 from quadriga.shared.recording.metadata import END
 from quadriga.shared.recording.quota import describe_refused
 from quadriga.shared.recording.ticks import TickTrack
-from quadriga.shared.robot.robots import ROBOTS
+from quadriga.shared.robots.registry import ROBOTS
 from quadriga.shared.runtime.clock import format_local
 from quadriga.tables import NOTHING, align_columns
 
@@ -71,8 +71,8 @@ def _about(s: Survey) -> Iterator[tuple[str, str]]:
         )
         absent = absent_origin(c.planner.kind)
         yield "planner", c.planner.kind + (f" (not installed here: {absent})" if absent else "")
-        if c.team.controller:
-            yield "controller", s.metadata.get("controller", c.team.controller)
+        if c.team.agent_command:
+            yield "controller", s.metadata.get("controller", c.team.agent_command)
     yield "falls", ", ".join(e.robot for e in s.events if e.kind == "fall") or "none"
     vanished = s.notes.get(END, {}).get("detail", NOTHING)
     yield "end", next((e.detail for e in reversed(s.events) if e.kind == "stop"), vanished)

@@ -9,7 +9,7 @@ from fnmatch import fnmatchcase
 from typing import Final
 
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.wire.topics import TABLE
+from quadriga.shared.topics import TABLE
 
 _ALLOWED: Final = re.compile(r"[\w.*?-]+(/[\w.*?-]+)*")
 _GLOB: Final = re.compile(r"[*?]")

@@ -13,11 +13,11 @@ from typing import Final
 from quadriga.recordings.key_patterns import KeyPattern, key_patterns
 from quadriga.recordings.readable import open_readable
 from quadriga.shared.bus.session import POLL, Bus
+from quadriga.shared.codec import envelope
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import RecordingError
 from quadriga.shared.recording.reader import ChunkEntry
 from quadriga.shared.runtime.clock import log_ns, monotonic
-from quadriga.shared.wire.codec import envelope
 
 _PATIENCE: Final = 3.0  # s wall without a message after which a listener is shown where it listens
 

@@ -28,7 +28,7 @@ def build_metadata(config: Config, predictor_sha256: str) -> dict[str, str]:
     Raises:
         ConfigError: the file of a controller of one's own cannot be read.
     """
-    origin = controller_origin(config.team.controller)
+    origin = controller_origin(config.team.agent_command)
     plugin = describe_plugin(config.planner.kind)
     return {
         "team": config.team.name,

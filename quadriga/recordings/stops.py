@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Final
 
 from quadriga.recordings.traces import Traces
-from quadriga.shared.wire.codes import BACK, GONE, SILENT, with_detail
-from quadriga.shared.wire.topics import COMMAND, STATE
+from quadriga.shared.codes import BACK, GONE, SILENT, with_detail
+from quadriga.shared.topics import COMMAND, STATE
 
 _LOST: Final = (GONE, SILENT)
 

@@ -28,14 +28,14 @@ from quadriga.recordings.traces import (
     tracking_errors,
 )
 from quadriga.recordings.truth import distance
+from quadriga.shared.codes import FALL, code_of
+from quadriga.shared.messages import Status
 from quadriga.shared.recording.metadata import END, LOST, RECORDING
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.conventions import OUTPUTS, Array
+from quadriga.shared.robots.conventions import OUTPUTS, Array
 from quadriga.shared.runtime.atomic import write_text
 from quadriga.shared.runtime.histogram import QUANTILES
-from quadriga.shared.wire.codes import FALL, code_of
-from quadriga.shared.wire.messages import Status
-from quadriga.shared.wire.topics import COMMAND, STATE
+from quadriga.shared.topics import COMMAND, STATE
 
 __all__ = ["RECORDING", "SUMMARY", "kept_summary", "steady_from", "summarise", "summary_of"]
 
@@ -97,7 +97,7 @@ def summary_of(traces: Traces) -> dict[str, Any]:
         "scenario": config.world.scenario,
         "terrain": config.world.terrain,
         "planner": config.planner.kind,
-        "controller": config.team.controller,
+        "controller": config.team.agent_command,
         "estimator": config.estimator.kind,
         "config_sha256": metadata.get("config_sha256", ""),
         "predictor_sha256": metadata.get("predictor_sha256", ""),
@@ -258,7 +258,7 @@ def _traffic(traces: Traces) -> dict[str, Any]:
 def _count_lost(traces: Traces) -> int:
     """Messages that the recorder missed; a controller of one's own need not answer every tick."""
     lost = traces.notes.get(LOST, {})
-    foreign = f"/{COMMAND.name}" if traces.config.team.controller else " "
+    foreign = f"/{COMMAND.name}" if traces.config.team.agent_command else " "
     return sum(int(count) for key, count in lost.items() if not key.endswith(foreign))
 
 

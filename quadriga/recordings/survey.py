@@ -8,16 +8,16 @@ from pathlib import Path
 from typing import Any
 
 from quadriga.recordings.readable import open_readable
+from quadriga.shared.codec import decode
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
 from quadriga.shared.errors import MessageError, RecordingError
+from quadriga.shared.messages import Event, Message, Status
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import ChunkEntry, name_of
 from quadriga.shared.recording.recover import Damage
 from quadriga.shared.recording.ticks import SkippedTicks, TickTrack
-from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.messages import Event, Message, Status
-from quadriga.shared.wire.topics import AGENT_EVENT, EVENT, INJECTED, STATUS, TABLE, topic_of
+from quadriga.shared.topics import AGENT_EVENT, EVENT, INJECTED, STATUS, TABLE, topic_of
 
 _DECODED: dict[str, type[Message]] = {
     EVENT.name: Event,

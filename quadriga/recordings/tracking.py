@@ -9,8 +9,8 @@ import numpy as np
 from quadriga.recordings.applied_plans import join_applied_samples
 from quadriga.recordings.traces import Traces, in_force
 from quadriga.recordings.truth import Ticks
-from quadriga.shared.robot.conventions import OUTPUTS, Array
-from quadriga.shared.wire.topics import SAMPLE_MS
+from quadriga.shared.robots.conventions import OUTPUTS, Array
+from quadriga.shared.topics import SAMPLE_MS
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.robot.spec import RobotSpec
-from quadriga.shared.wire.messages import Truth
+from quadriga.shared.messages import Truth
+from quadriga.shared.robots.conventions import Array
+from quadriga.shared.robots.spec import RobotSpec
 from quadriga.sim_server.terrain.terrain import Terrain, build_terrain
 from quadriga.sim_server.world.team_model import formation
 

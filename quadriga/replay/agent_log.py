@@ -13,10 +13,10 @@ from quadriga.agents.inbox.intake_log import ANYONE
 from quadriga.agents.teammates import concerns_agents
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import RecordingError
+from quadriga.shared.messages import Consumed, Event
 from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.recording.reader import ChunkEntry, Recording
-from quadriga.shared.wire.messages import Consumed, Event
-from quadriga.shared.wire.topics import (
+from quadriga.shared.topics import (
     COMMAND,
     ESTOP,
     INPUTS,

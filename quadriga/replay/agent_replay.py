@@ -28,7 +28,7 @@ from quadriga.shared.recording.reader import Recording
 from quadriga.shared.runtime.blas import use_one_blas_thread
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.runtime.collector import collector_off
-from quadriga.shared.wire.topics import PLAN
+from quadriga.shared.topics import PLAN
 
 _SHOWN_EVERY: Final = 100  # ticks
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from quadriga.agents.agent import Agent, AgentState, Inputs
 from quadriga.replay.comparison import Comparison
-from quadriga.shared.wire.messages import Message
+from quadriga.shared.messages import Message
 
 
 class Breakpoint:

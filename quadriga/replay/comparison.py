@@ -11,10 +11,10 @@ from quadriga.agents.agent import AgentState, Inputs, Outputs
 from quadriga.agents.inbox.inbox import order_of
 from quadriga.replay.agent_log import AgentLog, Serial
 from quadriga.replay.difference import Difference, find_difference
+from quadriga.shared.codec import decode, encode
 from quadriga.shared.errors import MessageError
-from quadriga.shared.wire.codec import decode, encode
-from quadriga.shared.wire.messages import Message
-from quadriga.shared.wire.topics import COMMAND, MEASUREMENT, PLAN, TABLE
+from quadriga.shared.messages import Message
+from quadriga.shared.topics import COMMAND, MEASUREMENT, PLAN, TABLE
 
 # In the order in which one follows from the other within a step.
 COMPARED = (MEASUREMENT, PLAN, COMMAND)

@@ -7,10 +7,10 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from quadriga.shared.codec import decode
 from quadriga.shared.errors import MessageError
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.messages import Message
+from quadriga.shared.messages import Message
+from quadriga.shared.robots.conventions import Array
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,9 +12,9 @@ from quadriga.charts.draw import draw_panels
 from quadriga.charts.files import save_png
 from quadriga.charts.panels import BESIDE, Curve, Panel, PanelGrid
 from quadriga.shared.errors import RecordingError, name_file_errors
-from quadriga.shared.robot.conventions import JOINT_NAMES, OUTPUTS, Array, Leg
-from quadriga.shared.wire.messages import Command, Measurement, Message, Plan
-from quadriga.shared.wire.topics import SAMPLE_MS
+from quadriga.shared.messages import Command, Measurement, Message, Plan
+from quadriga.shared.robots.conventions import JOINT_NAMES, OUTPUTS, Array, Leg
+from quadriga.shared.topics import SAMPLE_MS
 
 _RECORDED, _RECOMPUTED, _DIFFERENCE = "true", "planned", "own"  # styles
 _TINY: Final = 1e-9

@@ -12,8 +12,8 @@ from itertools import pairwise
 from typing import Final
 
 from quadriga.replay.agent_log import AgentLog
-from quadriga.shared.wire.messages import Consumed
-from quadriga.shared.wire.topics import COMMAND
+from quadriga.shared.messages import Consumed
+from quadriga.shared.topics import COMMAND
 
 _NEVER: Final = 1 << 62  # ms
 _OUTLIVED_MS: Final = 1000  # of states after its last command: a process that did not see the end

@@ -13,10 +13,10 @@ def require_own_agents(recording: Recording, config: Config) -> None:
     Raises:
         RecordingError: the recorded team walked with one.
     """
-    if config.team.controller:
+    if config.team.agent_command:
         raise RecordingError(
             str(recording.path),
-            f"commands of the controller {config.team.controller!r}",
+            f"commands of the controller {config.team.agent_command!r}",
             "commands of the project's own agents",
             "a controller of one's own cannot be recomputed; the world can: `quadriga resim`",
         )

@@ -13,8 +13,8 @@ from quadriga.agents.inbox.intake_log import format_message_id, has_rule, parse_
 from quadriga.agents.planning.interface import NOTHING
 from quadriga.replay.agent_log import AgentLog, Packet
 from quadriga.shared.config.sections import Config
-from quadriga.shared.wire.messages import Consumed, State
-from quadriga.shared.wire.topics import INPUTS, MEASUREMENT, SAMPLE_MS, STATE, WORDS
+from quadriga.shared.messages import Consumed, State
+from quadriga.shared.topics import INPUTS, MEASUREMENT, SAMPLE_MS, STATE, WORDS
 
 _BEFORE: Final = (-1, 0)
 _LONGEST_GAP: Final = 1000  # ticks without a state or a record that are gone through one by one

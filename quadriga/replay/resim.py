@@ -25,7 +25,7 @@ def compare_world(path: Path, console: Console) -> bool:
         RecordingError: no recording, not of a lock-step world, or with commands missing.
     """
     recording = Recording(path)
-    seconds = recorded_config(recording).world.seconds
+    seconds = recorded_config(recording).world.duration
     begun = monotonic()
     last = WorldComparison(0, 0)
     bar = build_progress(console, "{task.completed:.1f}/{task.total:g} s", fleeting=True)

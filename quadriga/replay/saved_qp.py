@@ -24,7 +24,7 @@ import numpy as np
 from quadriga.agents.agent import Agent, AgentState, Inputs, StepProblems
 from quadriga.agents.planner.qp_solver import SolvedQp
 from quadriga.shared.errors import RecordingError, name_file_errors
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.npz import UNREADABLE, as_measured, open_npz
 
 WHOLE_BODY: Final = "command"  # the topic that is made of it

@@ -20,7 +20,7 @@ from quadriga.replay.problem_saver import ProblemSaver
 from quadriga.shared.errors import ConfigError, QuadrigaError, RecordingError, name_file_errors
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.robots.conventions import robot_names
 from quadriga.warm_up import warm_up
 from quadriga.workers import run_each
 

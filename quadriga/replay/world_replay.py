@@ -11,14 +11,14 @@ from quadriga.plant.late import damp_joints
 from quadriga.plant.lost import LostCommands
 from quadriga.recordings.by_tick import by_tick
 from quadriga.replay.difference import Difference, find_difference
+from quadriga.shared import codes
+from quadriga.shared.codec import decode, encode
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError, RecordingError
+from quadriga.shared.messages import Command, Event, Message
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import ChunkEntry, M, Recording
-from quadriga.shared.wire import codes
-from quadriga.shared.wire.codec import decode, encode
-from quadriga.shared.wire.messages import Command, Event, Message
-from quadriga.shared.wire.topics import COMMAND, EVENT, STATE, TRUTH, topic_of
+from quadriga.shared.topics import COMMAND, EVENT, STATE, TRUTH, topic_of
 from quadriga.sim_server.world.world import World
 
 _NAMES: Final = frozenset(topic.name for topic in (STATE, COMMAND, TRUTH, EVENT))
@@ -125,7 +125,8 @@ def read_computable_config(recording: Recording) -> Config:
     if not config.team.one_world:
         raise RecordingError(
             str(recording.path),
-            f"team.plant {config.team.plant!r} and team.plants {config.team.plants!r}",
+            f"team.plant {config.team.plant!r} and "
+            f"team.plant_per_robot {str(config.team.plant_per_robot).lower()}",
             "a walk in one simulated world",
             "no other plant can be computed again",
         )

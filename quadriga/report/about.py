@@ -11,13 +11,13 @@ import numpy as np
 from quadriga.agents.planner.cooperation import is_cooperative
 from quadriga.recordings.metadata import recorded_versions
 from quadriga.report.run import ReportedRun
+from quadriga.shared.codes import FALL
 from quadriga.shared.config.reference_trace import ROW_END
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.terrains import TERRAINS
 from quadriga.shared.config.write import departures
 from quadriga.shared.planner_kinds import find_kind
-from quadriga.shared.wire.codes import FALL
-from quadriga.shared.wire.topics import COMMAND, MEASUREMENT, PLAN, REFERENCE, STATE, STATUS, TRUTH
+from quadriga.shared.topics import COMMAND, MEASUREMENT, PLAN, REFERENCE, STATE, STATUS, TRUTH
 
 _DIGITS: Final = 12  # of a digest
 
@@ -80,8 +80,8 @@ def list_facts(run: ReportedRun) -> Iterator[tuple[str, str]]:
     speeds = f"vx {asked.vx:g} m/s, vy {asked.vy:g} m/s, wz {asked.wz:g} rad/s"
     rows = asked.trace.count(ROW_END)
     yield "asked for", f"a trace of {rows} lines" if rows else asked.trace or speeds
-    if config.team.controller:
-        yield "controller", config.team.controller
+    if config.team.agent_command:
+        yield "controller", config.team.agent_command
     whose = ", for the team's cost" if is_cooperative(config) else ""
     yield "planner", f"{config.planner.kind}{whose}, {config.planner.interface}"
     digest = traces.metadata.get("predictor_sha256", "")

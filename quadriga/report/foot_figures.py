@@ -17,8 +17,8 @@ from quadriga.recordings.applied_plans import join_applied_samples
 from quadriga.recordings.truth import Ticks
 from quadriga.report.run import ReportedRun
 from quadriga.report.trunk_figures import first_fall, mark_falls
-from quadriga.shared.robot.conventions import Leg
-from quadriga.shared.wire.topics import SAMPLE_MS
+from quadriga.shared.robots.conventions import Leg
+from quadriga.shared.topics import SAMPLE_MS
 
 _GAP: Final = 1.5e-3 * SAMPLE_MS
 _STRIDES: Final = 4  # enlarged

@@ -17,10 +17,10 @@ from quadriga.recordings.traces import plan_times, quantile_of, times_of
 from quadriga.report.run import ReportedRun
 from quadriga.report.trunk_figures import draw_over_run, mark_falls, robot_legend
 from quadriga.shared.members import PLANNER
+from quadriga.shared.messages import Status
 from quadriga.shared.planner_kinds import find_kind
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.wire.messages import Status
-from quadriga.shared.wire.topics import REFERENCE
+from quadriga.shared.robots.conventions import Array
+from quadriga.shared.topics import REFERENCE
 from quadriga.tables import format_number
 
 _BINS: Final = 60  # of a histogram

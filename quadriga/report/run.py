@@ -16,8 +16,8 @@ from quadriga.recordings.truth import Ticks
 from quadriga.report.samples import Samples, read_samples
 from quadriga.report.timeline import TimelineEntry, build_timeline
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.wire.topics import COMMAND, MEASUREMENT, STATE, STATUS, TRUTH
+from quadriga.shared.robots.conventions import Array
+from quadriga.shared.topics import COMMAND, MEASUREMENT, STATE, STATUS, TRUTH
 
 _PACED: Final = tuple(topic.name for topic in (STATE, COMMAND, MEASUREMENT, STATUS, TRUTH))
 _FORGED: Final = 60_000  # ms after the configured end: later ticks are not of this world

@@ -13,14 +13,14 @@ from quadriga.agents.controller.maths.leg_kinematics import leg_kinematics
 from quadriga.agents.gait import scheduled_stance
 from quadriga.recordings.traces import Traces
 from quadriga.recordings.truth import Ticks, stack, ticks_of
+from quadriga.shared.codec import decode
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
+from quadriga.shared.messages import Measurement, State
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.conventions import N_FORCES, N_LEGS, Array, robot_names
-from quadriga.shared.robot.spec import Geometry
-from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.messages import Measurement, State
-from quadriga.shared.wire.topics import MEASUREMENT, SAMPLE_MS, STATE, topic_of
+from quadriga.shared.robots.conventions import N_FORCES, N_LEGS, Array, robot_names
+from quadriga.shared.robots.spec import Geometry
+from quadriga.shared.topics import MEASUREMENT, SAMPLE_MS, STATE, topic_of
 
 _STALE_MS: Final = 100  # a stance reported longer ago than this is not that of now
 _LOADED: Final = 10.0  # N of true force that is a contact

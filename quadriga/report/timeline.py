@@ -13,10 +13,10 @@ from quadriga.agents.modes import DAMPING, ESTOP, STAND, WALK
 from quadriga.agents.planner.qp_solver import SOLVED
 from quadriga.recordings.traces import Traces
 from quadriga.recordings.truth import Ticks
+from quadriga.shared.codes import FALL, code_of
 from quadriga.shared.config.timing import periods
-from quadriga.shared.wire.codes import FALL, code_of
-from quadriga.shared.wire.messages import Plan, Status
-from quadriga.shared.wire.topics import MEASUREMENT, STATE, TRUTH
+from quadriga.shared.messages import Plan, Status
+from quadriga.shared.topics import MEASUREMENT, STATE, TRUTH
 
 FAULT: Final = "fault"
 STOP: Final = "stopped"
@@ -37,7 +37,7 @@ class TimelineEntry:
         robot: whom it concerns, or empty.
         kind: of an event of the world, or stopped, mode, plan, counted, gap.
         text: what it was.
-        code: of an event, a plan's status or a reason to stop (`quadriga.shared.wire.codes`).
+        code: of an event, a plan's status or a reason to stop (`quadriga.shared.codes`).
         passive: whether the robot's joints were only damped from then on.
     """
 

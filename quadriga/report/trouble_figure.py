@@ -16,7 +16,7 @@ from quadriga.report.timeline import FAULT, STOP
 from quadriga.report.troubles import Trouble
 from quadriga.report.trunk_figures import robot_legend
 from quadriga.report.window import BEFORE_MS, SLIP, TILT
-from quadriga.shared.wire.codes import FALL
+from quadriga.shared.codes import FALL
 
 _AFTER_MS: Final = 200  # shown after the second that is judged
 _GAP: Final = 0.05  # s without a sample, after which a curve is not joined

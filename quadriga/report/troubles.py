@@ -21,9 +21,9 @@ from quadriga.report.window import (
     find_lost_stance,
     passive_since,
 )
-from quadriga.shared.robot.conventions import Leg
-from quadriga.shared.wire.codes import FALL
-from quadriga.shared.wire.topics import SAMPLE_MS
+from quadriga.shared.codes import FALL
+from quadriga.shared.robots.conventions import Leg
+from quadriga.shared.topics import SAMPLE_MS
 
 _SIGNS: Final = ("push", "plan", "counted", "gap", "mode")  # kinds of entries that are signs
 

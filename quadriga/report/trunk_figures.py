@@ -14,10 +14,10 @@ from quadriga.recordings.applied_plans import join_applied_samples
 from quadriga.recordings.traces import demanded_outputs, estimate_errors
 from quadriga.recordings.truth import Ticks
 from quadriga.report.run import ReportedRun
+from quadriga.shared.codes import FALL
 from quadriga.shared.config.yokes import yoke_pairs
-from quadriga.shared.robot.conventions import OUTPUTS, Array
-from quadriga.shared.wire.codes import FALL
-from quadriga.shared.wire.topics import SAMPLE_MS
+from quadriga.shared.robots.conventions import OUTPUTS, Array
+from quadriga.shared.topics import SAMPLE_MS
 from quadriga.tables import LABELS, UNITS
 
 NAMES: Final = ("z [m]", "vx [m/s]", "vy [m/s]", "roll [rad]", "pitch [rad]", "wz [rad/s]")

@@ -7,7 +7,7 @@ from typing import Final
 from quadriga.charts.thinning import find_spells
 from quadriga.report.run import ReportedRun
 from quadriga.report.samples import Samples
-from quadriga.shared.wire.topics import SAMPLE_MS
+from quadriga.shared.topics import SAMPLE_MS
 
 BEFORE_MS: Final = 1000
 TOGETHER_MS: Final = 200  # troubles this close are one episode

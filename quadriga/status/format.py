@@ -10,7 +10,7 @@ from typing import Any, Final
 from quadriga.doctor.health import WELL
 from quadriga.recordings.late_commands import overloaded
 from quadriga.shared.printable import printable_line
-from quadriga.shared.wire.topics import TABLE
+from quadriga.shared.topics import TABLE
 from quadriga.status.record import Account, Costs, MemberStatus, TeamStatus
 from quadriga.tables import NOTHING, Table, align_columns, format_number
 

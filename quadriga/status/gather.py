@@ -11,14 +11,14 @@ import numpy as np
 
 from quadriga.recordings.late_commands import late_shares
 from quadriga.recordings.rates import RateFigures, Rates
+from quadriga.shared.codec import decode
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
 from quadriga.shared.members import LEADS
+from quadriga.shared.messages import Event, Message, Status, format_event
 from quadriga.shared.recording.reader import ChunkEntry
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.messages import Event, Message, Status, format_event
-from quadriga.shared.wire.topics import CLOCK, STATUS, find_topic
+from quadriga.shared.robots.conventions import Array
+from quadriga.shared.topics import CLOCK, STATUS, find_topic
 from quadriga.status.record import Account, Costs, TeamReading
 
 _EVENTS: Final = 5  # that are remembered

@@ -10,8 +10,8 @@ from quadriga.doctor.health import WELL
 from quadriga.recordings.late_commands import overloaded
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import max_ages
-from quadriga.shared.robot.conventions import robot_names
-from quadriga.shared.wire.topics import STATUS
+from quadriga.shared.robots.conventions import robot_names
+from quadriga.shared.topics import STATUS
 from quadriga.status.record import Account, MemberStatus, TeamReading
 
 # Share of a key's messages that did not come, of which is spoken: a listener on a busy machine
@@ -53,7 +53,7 @@ def _of_robot(config: Config, reading: TeamReading, robot: str) -> Iterator[str]
     """What is wrong with a robot of a team that walks, by what its agent told."""
     account = reading.accounts.get(robot)
     if account is None:
-        if not config.team.controller:  # which need not
+        if not config.team.agent_command:  # which need not
             yield "says nothing of itself"
         return
     # A team's time may be far slower than the wall clock, and then so are its words.

@@ -16,13 +16,13 @@ from quadriga.shared.bus.discovery import ask, view_of
 from quadriga.shared.bus.membership import processes
 from quadriga.shared.bus.process_info import describe_process
 from quadriga.shared.bus.session import HERE, Arrival, Bus
+from quadriga.shared.codec import envelope
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
 from quadriga.shared.members import OBSERVER
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns, sleep
 from quadriga.shared.runtime.process_use import read_use
-from quadriga.shared.wire.codec import envelope
-from quadriga.shared.wire.topics import TABLE
+from quadriga.shared.topics import TABLE
 from quadriga.status.gather import StatusFold
 from quadriga.status.judge import find_problems
 from quadriga.status.record import MachineUse, MemberStatus, TeamStatus

@@ -24,7 +24,7 @@ from quadriga.shared.config.write import to_toml
 from quadriga.shared.errors import BusError, ProcessError
 from quadriga.shared.members import OPERATOR
 from quadriga.shared.planner_kinds import find_kind
-from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.runtime.atomic import write_text
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.runtime.places import runtime_dir
@@ -75,7 +75,7 @@ def time_stops(
         ProcessError: a team did not start, or did not walk again.
     """
     driven = replace(config.reference, driver=BY_HAND, page_port=0)
-    world = replace(config.world, seconds=_FOREVER)
+    world = replace(config.world, duration=_FOREVER)
     config = replace(config, reference=driven, world=world)
     rows = open_rows(config, folder)
     predictor = _take_predictor(config, console)

@@ -9,11 +9,11 @@ from typing import Any, Final
 import numpy as np
 
 from quadriga.agents.modes import ESTOP, STAND
+from quadriga.shared import codes
+from quadriga.shared.codec import decode
+from quadriga.shared.messages import Event, Status
 from quadriga.shared.runtime.record import record
-from quadriga.shared.wire import codes
-from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.messages import Event, Status
-from quadriga.shared.wire.topics import STATUS, topic_of
+from quadriga.shared.topics import STATUS, topic_of
 from quadriga.tables import NOTHING, Table
 
 _PLANT: Final = ""

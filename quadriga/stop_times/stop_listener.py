@@ -16,12 +16,12 @@ from typing import Final
 from quadriga.shared.bus.session import Arrival, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.members import OBSERVER
-from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.runtime.installed import PYTHON
 from quadriga.shared.runtime.scheduling import go_first
 from quadriga.shared.runtime.signals import die_with_parent, stop_on_signals
-from quadriga.shared.wire.topics import EVENT, STATUS
+from quadriga.shared.topics import EVENT, STATUS
 from quadriga.team.spectator import end_process
 
 _LOOK_S: Final = 0.1

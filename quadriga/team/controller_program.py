@@ -23,9 +23,9 @@ def check_controller(config: Config) -> None:
     Raises:
         ConfigError: there is no such program, or no such script.
     """
-    if not config.team.controller:
+    if not config.team.agent_command:
         return
-    program, *rest = parse_line(config.team.controller)
+    program, *rest = parse_line(config.team.agent_command)
     if program != _PYTHON and shutil.which(program) is None:
         raise ConfigError(KEY, f"no program {program!r}", "one in PATH, or the path of one")
     for word in rest[:1]:
@@ -62,7 +62,7 @@ def become_controller(config: Config, places: Mapping[str, str]) -> NoReturn:
     Raises:
         ConfigError: the program cannot be started.
     """
-    program, *rest = fill_in(parse_line(config.team.controller), places)
+    program, *rest = fill_in(parse_line(config.team.agent_command), places)
     if program == _PYTHON:
         program = sys.executable
     for stream in (sys.stdout, sys.stderr):

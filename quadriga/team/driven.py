@@ -10,7 +10,7 @@ from quadriga.drive.controls import DriveControls, now_ms
 from quadriga.drive.steering import GO_ON, STOP, LastWord, steer
 from quadriga.drive.wish import NAMES, Wish, approach, standing
 from quadriga.shared.config.sections import Config
-from quadriga.shared.wire.messages import Reference
+from quadriga.shared.messages import Reference
 
 LOOK: Final = 0.02  # s, between two looks at who drives
 

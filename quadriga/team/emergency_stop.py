@@ -8,11 +8,11 @@ from typing import Final, Self
 
 from quadriga.drive.stop_proof import unconfirmed
 from quadriga.shared import members
+from quadriga.shared.codec import truncate_text
 from quadriga.shared.config.sections import Config
+from quadriga.shared.messages import EStop
 from quadriga.shared.runtime.clock import monotonic
-from quadriga.shared.wire.codec import truncate_text
-from quadriga.shared.wire.messages import EStop
-from quadriga.shared.wire.topics import ESTOP
+from quadriga.shared.topics import ESTOP
 from quadriga.team.talk import SEARCH, Say, TeamTalk, keep_quiet
 
 _LOOK: Final = 0.005  # s, between two looks at who is there
@@ -43,7 +43,7 @@ class EmergencyStop:
     def __init__(self, config: Config, tell: Say = keep_quiet) -> None:
         self._tell = tell
         self._talk = TeamTalk(config, members.ESTOP)
-        self._plant_each = config.team.plants == "each"
+        self._plant_each = config.team.plant_per_robot
         self._say = self._talk.publisher(ESTOP)
         self.wanted = self._talk.wanted
 

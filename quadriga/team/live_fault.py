@@ -5,15 +5,15 @@ from __future__ import annotations
 from typing import Final
 
 from quadriga.shared.bus.session import POLL, Bus
+from quadriga.shared.codec import decode, encode, envelope
+from quadriga.shared.codes import FAULT_ASKED, FAULT_REFUSED
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError, ConfigError, MessageError
 from quadriga.shared.members import LAUNCHER
-from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.messages import Event, LiveFault
+from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic
-from quadriga.shared.wire.codec import decode, encode, envelope
-from quadriga.shared.wire.codes import FAULT_ASKED, FAULT_REFUSED
-from quadriga.shared.wire.messages import Event, LiveFault
-from quadriga.shared.wire.topics import CLOCK, EVENT, LIVE_FAULT
+from quadriga.shared.topics import CLOCK, EVENT, LIVE_FAULT
 from quadriga.sim_server.world.faults import build_components, parse_faults, with_time
 
 _PATIENCE: Final = 5.0  # s, for the team to be there, and for the answer

@@ -15,17 +15,17 @@ from quadriga.shared import members
 from quadriga.shared.bus.discovery import REJOINS, join
 from quadriga.shared.bus.liveness import Liveness
 from quadriga.shared.bus.session import POLL, READY, Bus
+from quadriga.shared.codec import decode, encode
 from quadriga.shared.config.reference import BY_HAND
 from quadriga.shared.config.reference_trace import trace_of
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
+from quadriga.shared.messages import Clock, Event, Reference
 from quadriga.shared.runtime.places import make_runtime_dir
 from quadriga.shared.runtime.scheduling import at_work
 from quadriga.shared.runtime.signals import stop_on_signals
-from quadriga.shared.wire.codec import decode, encode
-from quadriga.shared.wire.messages import Clock, Event, Reference
-from quadriga.shared.wire.topics import CLOCK, EVENT, REFERENCE
-from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS as EPOCH_MS
+from quadriga.shared.topics import CLOCK, EVENT, REFERENCE
+from quadriga.shared.topics import REFERENCE_EPOCH_MS as EPOCH_MS
 from quadriga.team.driven import LOOK, DrivenReferences
 
 _AHEAD: Final = 4  # epochs; agents in lock-step wait for the one in force
@@ -108,7 +108,7 @@ class _Operator:
         realtime = config.world.mode == "realtime"
         self._put = bus.publisher(REFERENCE.key(bus.team), droppable=realtime)
         self._bus, self._watch = bus, Liveness(bus, config)
-        self._time = TeamTicks(bus, round(1000 * config.world.seconds))
+        self._time = TeamTicks(bus, round(1000 * config.world.duration))
         controls.time = lambda: (self._time.tick, 1_000_000 * self._time.tick)
         self._controls = controls
         self._driven = DrivenReferences(config, controls) if controls.drivable else None

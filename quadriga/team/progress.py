@@ -13,15 +13,15 @@ from quadriga.progress import build_progress
 from quadriga.recordings.late_commands import late_shares, overloaded
 from quadriga.shared.bus.membership import members
 from quadriga.shared.bus.session import HERE, READY, Bus
+from quadriga.shared.codec import decode
+from quadriga.shared.codes import DOWN
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
 from quadriga.shared.members import LAUNCHER, LEADS
+from quadriga.shared.messages import Clock, Event, Status, Truth
 from quadriga.shared.printable import printable_line
 from quadriga.shared.runtime.clock import monotonic
-from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.codes import DOWN
-from quadriga.shared.wire.messages import Clock, Event, Status, Truth
-from quadriga.shared.wire.topics import CLOCK, STATUS, TRUTH, topics_for
+from quadriga.shared.topics import CLOCK, STATUS, TRUTH, topics_for
 
 _TELL_EVERY: Final = 10.0  # s wall between two lines of how far a walk has come, without a terminal
 _ABSENT_EVERY: Final = 2.0  # s wall between two lines of who is awaited
@@ -41,7 +41,7 @@ class WalkProgress:
         for topic in topics_for(LAUNCHER):
             self._bus.subscribe(topic.key(config.team.name, "*"))
         self._bar = build_progress(console, "{task.fields[text]}", hidden=False)
-        self._task = self._bar.add_task("starting", total=config.world.seconds, text="")
+        self._task = self._bar.add_task("starting", total=config.world.duration, text="")
         self._begun = self._told = 0.0
         self._text, self._walks = "", False
         self._counted: dict[str, Mapping[str, int]] = {}  # by plant what it had counted
@@ -107,7 +107,7 @@ class WalkProgress:
         now = monotonic()
         self._begun = self._begun or now - seconds
         pace = seconds / max(now - self._begun, 1e-3)
-        so_far = f"{seconds:.1f}/{self._config.world.seconds:g} s  {self._speed}"
+        so_far = f"{seconds:.1f}/{self._config.world.duration:g} s  {self._speed}"
         text = f"{so_far}{pace:.2f} × real time"
         self._bar.update(self._task, description="walking", completed=seconds, text=text)
         if not self._walks or now - self._told > _TELL_EVERY:

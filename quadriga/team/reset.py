@@ -6,10 +6,10 @@ from typing import Final
 
 from quadriga.agents.modes import STAND, WALK
 from quadriga.shared import members
+from quadriga.shared.codec import truncate_text
 from quadriga.shared.config.sections import Config
-from quadriga.shared.wire.codec import truncate_text
-from quadriga.shared.wire.messages import Reset, Resume
-from quadriga.shared.wire.topics import RESET, RESUME
+from quadriga.shared.messages import Reset, Resume
+from quadriga.shared.topics import RESET, RESUME
 from quadriga.team.resume import PATIENCE
 from quadriga.team.talk import Say, TeamTalk, keep_quiet
 

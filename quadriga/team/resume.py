@@ -8,8 +8,8 @@ from quadriga.agents.healing import WORD_MS
 from quadriga.agents.modes import WALK
 from quadriga.shared import members
 from quadriga.shared.config.sections import Config
-from quadriga.shared.wire.messages import Resume
-from quadriga.shared.wire.topics import RESUME
+from quadriga.shared.messages import Resume
+from quadriga.shared.topics import RESUME
 from quadriga.team.talk import Say, TeamTalk, keep_quiet
 
 PATIENCE: Final = 1e-3 * WORD_MS + 1.0  # s, in which robots that may go on do so

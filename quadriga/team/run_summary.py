@@ -11,16 +11,9 @@ from quadriga.agents.modes import is_commanded
 from quadriga.recordings.summary import RECORDING, summarise
 from quadriga.recordings.summary_table import print_summary
 from quadriga.recordings.traces import read_traces
+from quadriga.shared.codes import CLOCK_SET, LEAD_GONE, LINK_LOST, PLANT_FAILED, PLANT_GONE, SIGNAL
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.wire.codes import (
-    CLOCK_SET,
-    LEAD_GONE,
-    LINK_LOST,
-    PLANT_FAILED,
-    PLANT_GONE,
-    SIGNAL,
-)
 
 # Of an end that should not be, by the code of its event; "" where none was recorded.
 _CAUSES: Final = {
@@ -73,6 +66,6 @@ def check_end(summary: dict[str, Any]) -> None:
         raise ProcessError(
             "the walk",
             f"an end at {summary['duration']:.1f} s",
-            "world.seconds or a fall",
+            "world.duration or a fall",
             _CAUSES[end],
         )

@@ -6,11 +6,11 @@ from typing import Final
 
 from quadriga.agents.modes import DAMPING, ESTOP, STAND
 from quadriga.shared import members
+from quadriga.shared.codec import truncate_text
+from quadriga.shared.codes import STOP_ASKED
 from quadriga.shared.config.sections import Config
-from quadriga.shared.wire.codec import truncate_text
-from quadriga.shared.wire.codes import STOP_ASKED
-from quadriga.shared.wire.messages import SafeStop
-from quadriga.shared.wire.topics import STOP
+from quadriga.shared.messages import SafeStop
+from quadriga.shared.topics import STOP
 from quadriga.team.talk import Say, TeamTalk, keep_quiet
 
 _PATIENCE: Final = 5.0  # s, in which the team stands

@@ -8,15 +8,15 @@ from typing import Final, Self
 
 from quadriga.shared.bus.membership import processes
 from quadriga.shared.bus.session import HERE, POLL, Bus
+from quadriga.shared.codec import decode, encode, envelope
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError, MessageError
 from quadriga.shared.members import AGENT, SIM
-from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.messages import Event, Message, Status
+from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic
-from quadriga.shared.wire.codec import decode, encode, envelope
-from quadriga.shared.wire.messages import Event, Message, Status
-from quadriga.shared.wire.topic import Topic
-from quadriga.shared.wire.topics import EVENT, STATUS, topics_for
+from quadriga.shared.topic import Topic
+from quadriga.shared.topics import EVENT, STATUS, topics_for
 
 SEARCH: Final = 5.0  # s, longest search for the team
 _AGAIN, _OFTEN_FOR = 0.1, 1.0  # s: how often a word is said again at first, and for how long

@@ -9,15 +9,15 @@ from typing import Final
 
 from rich.console import Console
 
+from quadriga.shared.codes import FAULT_ENDS
 from quadriga.shared.config.reference_trace import trace_of
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import OPERATOR
+from quadriga.shared.messages import Event
 from quadriga.shared.planner_kinds import find_kind
-from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.runtime.scheduling import valid_priority
 from quadriga.shared.runtime.signals import stop_flag
-from quadriga.shared.wire.codes import FAULT_ENDS
-from quadriga.shared.wire.messages import Event
 from quadriga.sim_server.world.faults import Injection
 from quadriga.sim_server.world.scenario import build_loads, build_scenario
 from quadriga.team.controller_program import check_controller
@@ -64,7 +64,7 @@ def check_walk(config: Config) -> list[Event]:
     faults = Injection(config, robot_names(config.team.robots)).events
     trace_of(config)
     begin = (event for event in (*events, *faults) if event.code != FAULT_ENDS)
-    return [event for event in begin if event.tick >= 1000 * config.world.seconds]
+    return [event for event in begin if event.tick >= 1000 * config.world.duration]
 
 
 def walk(
@@ -91,7 +91,7 @@ def walk(
         QuadrigaError: anything a user can put right before the walk begins.
     """
     expect_launch(config)
-    _tell(check_walk(config), config.world.seconds, console)
+    _tell(check_walk(config), config.world.duration, console)
     run_dir = make_run_dir(out, config)
     console.print(f"run folder: {run_dir}", markup=False, highlight=False, soft_wrap=True)
     warm_up(config, console)

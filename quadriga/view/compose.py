@@ -8,9 +8,9 @@ import numpy as np
 
 from quadriga.recordings.dead_reckoning import follow_speeds
 from quadriga.recordings.truth import yaw_of
-from quadriga.shared.robot.conventions import N_LEGS, N_OUTPUTS, Array
-from quadriga.shared.wire.messages import Plan
-from quadriga.shared.wire.topics import SAMPLE_MS
+from quadriga.shared.messages import Plan
+from quadriga.shared.robots.conventions import N_LEGS, N_OUTPUTS, Array
+from quadriga.shared.topics import SAMPLE_MS
 from quadriga.view.picture import Picture
 from quadriga.view.placement import quat_of
 from quadriga.view.skeleton import rotate

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from quadriga.shared.robot.conventions import N_OUTPUTS, Array
+from quadriga.shared.robots.conventions import N_OUTPUTS, Array
 from quadriga.view.picture import TeamOutputs
 
 SECONDS: Final = 8.0  # that are shown

@@ -4,15 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from quadriga.shared.wire.messages import (
-    Measurement,
-    Message,
-    Plan,
-    Reference,
-    State,
-    Status,
-    Truth,
-)
+from quadriga.shared.messages import Measurement, Message, Plan, Reference, State, Status, Truth
 from quadriga.view.placement import Placement
 from quadriga.view.snapshot import Snapshot
 from quadriga.view.team_shape import TeamShape

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from quadriga.sim_server.terrain.terrain import Terrain
 
 _MOST: Final = 40_000  # vertices of a surface: more would take a browser long to load

@@ -8,13 +8,13 @@ from typing import Final, NamedTuple
 
 from quadriga.shared.bus.ring_buffer import Newest
 from quadriga.shared.bus.session import HERE, Bus
+from quadriga.shared.codec import decode
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
+from quadriga.shared.messages import Event, Status
 from quadriga.shared.runtime.clock import Rate, monotonic
-from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.messages import Event, Status
-from quadriga.shared.wire.topic import Topic
-from quadriga.shared.wire.topics import (
+from quadriga.shared.topic import Topic
+from quadriga.shared.topics import (
     AGENT_EVENT,
     COMMAND,
     EVENT,

@@ -10,8 +10,8 @@ import viser
 from viser import uplot
 
 from quadriga.charts.colours import LINES
-from quadriga.shared.robot.colours import robot_colour
-from quadriga.shared.robot.conventions import OUTPUTS, Array
+from quadriga.shared.robots.colours import robot_colour
+from quadriga.shared.robots.conventions import OUTPUTS, Array
 from quadriga.view import words
 from quadriga.view.curves import KINDS, CurveWindow, axis_range
 from quadriga.view.team_shape import TeamShape

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 
 from quadriga.recordings.dead_reckoning import follow_speeds
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.wire.messages import Measurement
+from quadriga.shared.messages import Measurement
+from quadriga.shared.robots.conventions import Array
 
 LONGEST_MS: Final = 200  # a robot that was not heard for longer is where it was heard last
 

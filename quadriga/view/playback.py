@@ -8,7 +8,7 @@ from pathlib import Path
 from quadriga.playback.transport import Transport
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.runtime.clock import Rate, monotonic
-from quadriga.shared.wire.topics import SAMPLE_MS
+from quadriga.shared.topics import SAMPLE_MS
 from quadriga.view.controls import Controls
 from quadriga.view.curves import ticks_before
 from quadriga.view.port import PageAddress, url_of

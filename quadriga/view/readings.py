@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from quadriga.recordings.truth import true_outputs
-from quadriga.shared.robot.conventions import N_OUTPUTS, Array
-from quadriga.shared.wire.messages import Reference, Status
-from quadriga.shared.wire.topics import SAMPLE_MS
+from quadriga.shared.messages import Reference, Status
+from quadriga.shared.robots.conventions import N_OUTPUTS, Array
+from quadriga.shared.topics import SAMPLE_MS
 from quadriga.view.compose import sample_at
 from quadriga.view.picture import RobotAccount, TeamOutputs
 from quadriga.view.snapshot import Snapshot

@@ -9,21 +9,13 @@ from typing import Any, Final, Generic, TypeVar
 
 from quadriga.recordings.traces import read_traces
 from quadriga.report.timeline import STOP, build_timeline
+from quadriga.shared.codec import decode
 from quadriga.shared.errors import MessageError, RecordingError
+from quadriga.shared.messages import Measurement, Message, Plan, Reference, State, Status, Truth
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.conventions import robot_names
-from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.messages import (
-    Measurement,
-    Message,
-    Plan,
-    Reference,
-    State,
-    Status,
-    Truth,
-)
-from quadriga.shared.wire.topics import (
+from quadriga.shared.robots.conventions import robot_names
+from quadriga.shared.topics import (
     MEASUREMENT,
     PLAN,
     REFERENCE,

@@ -8,8 +8,8 @@ import mujoco
 import numpy as np
 
 from quadriga.shared.config.motors import MotorsConfig
-from quadriga.shared.robot.conventions import FOOT_FRAMES, Array
-from quadriga.shared.robot.spec import RobotSpec
+from quadriga.shared.robots.conventions import FOOT_FRAMES, Array
+from quadriga.shared.robots.spec import RobotSpec
 from quadriga.sim_server.world.layout import ATTITUDE, JOINT_POSITIONS, NQ, POSITION
 from quadriga.sim_server.world.robot_body import RobotBody
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from quadriga.shared.wire.messages import Measurement, Plan, Reference, State, Status, Truth
+from quadriga.shared.messages import Measurement, Plan, Reference, State, Status, Truth
 from quadriga.view.placement import Placement
 
 

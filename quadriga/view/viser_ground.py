@@ -6,7 +6,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from quadriga.sim_server.terrain.relief import Relief
 from quadriga.view.ground import read_boxes, read_surface
 from quadriga.view.scene_colours import to_linear

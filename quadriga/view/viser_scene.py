@@ -9,8 +9,8 @@ import viser
 
 from quadriga.charts.colours import LINES
 from quadriga.pictures.link_mesh import LinkMeshes
-from quadriga.shared.robot.colours import robot_colour
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.colours import robot_colour
+from quadriga.shared.robots.conventions import Array
 from quadriga.view.mesh_groups import MeshGroup, group_meshes
 from quadriga.view.picture import Picture
 from quadriga.view.scene_colours import rgb_of, to_linear

@@ -9,8 +9,8 @@ from typing import Final
 import numpy as np
 
 from quadriga.charts.colours import LINES, PALETTE
-from quadriga.shared.robot.colours import robot_colour
-from quadriga.shared.wire.messages import Reference
+from quadriga.shared.messages import Reference
+from quadriga.shared.robots.colours import robot_colour
 from quadriga.view.picture import Picture, RobotAccount
 from quadriga.view.team_shape import TeamShape
 from quadriga.view.traffic import KeyTraffic

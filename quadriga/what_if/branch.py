@@ -19,12 +19,12 @@ from quadriga.identification.rollout import Rollout, build_agents
 from quadriga.recordings.by_tick import by_tick
 from quadriga.replay.difference import Difference, find_difference
 from quadriga.replay.world_replay import read_asked_faults
+from quadriga.shared.codec import encode
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import RecordingError
+from quadriga.shared.messages import Event, Reference, Truth
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.messages import Event, Reference, Truth
-from quadriga.shared.wire.topics import SAMPLE_MS, STATE
+from quadriga.shared.topics import SAMPLE_MS, STATE
 from quadriga.sim_server.world.world import World
 from quadriga.team.operator import references_of
 
@@ -86,7 +86,7 @@ class _TwinAgent(Agent):
 def walk_branch(
     recording: Recording, config: Config, predictor: Predictor | None, change: Change
 ) -> Iterator[BranchTick]:
-    """Walk until the changed `world.seconds` are over, or a robot has fallen.
+    """Walk until the changed `world.duration` are over, or a robot has fallen.
 
     Args:
         recording: of a walk in lock-step, in one simulated world.
@@ -108,7 +108,7 @@ def walk_branch(
     rollout = Rollout(change.config, None, references, agents=agents)
     recorded = by_tick(recording, {STATE.name})
     asked = read_asked_faults(recording)
-    last = round(1000 * change.config.world.seconds)
+    last = round(1000 * change.config.world.duration)
     equal, parted = 0, None
     while rollout.world.tick < last and not rollout.world.fallen():
         if parted is None:

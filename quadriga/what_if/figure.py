@@ -11,7 +11,7 @@ from quadriga.charts.files import save_png
 from quadriga.charts.panels import DEGREES, Curve, Mark, Panel, PanelGrid
 from quadriga.recordings.truth import TruthTrace
 from quadriga.shared.errors import RecordingError, name_file_errors
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from quadriga.what_if.outcome import WalkCourse
 
 _RECORDED, _BRANCH = "true", "planned"  # styles

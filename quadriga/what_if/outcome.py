@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from quadriga.recordings.truth import TruthTrace, build_truth_trace, distance
+from quadriga.shared.codes import FALL
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import robot_names
-from quadriga.shared.wire.codes import FALL
-from quadriga.shared.wire.messages import Event, Truth
+from quadriga.shared.messages import Event, Truth
+from quadriga.shared.robots.conventions import robot_names
 from quadriga.tables import NOTHING, Table
 
 

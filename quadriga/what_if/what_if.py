@@ -18,10 +18,10 @@ from quadriga.replay.recorded_predictor import find_predictor
 from quadriga.replay.world_replay import read_computable_config
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
+from quadriga.shared.messages import Event, Truth
 from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.conventions import robot_names
-from quadriga.shared.wire.messages import Event, Truth
+from quadriga.shared.robots.conventions import robot_names
 from quadriga.tables import Table
 from quadriga.warm_up import warm_up
 from quadriga.what_if.branch import Change, walk_branch
@@ -92,7 +92,7 @@ def answer_what_if(question: WhatIf, console: Console) -> Branch:
     walked, happened, equal, parted = list[Truth](), list[Event](), 0, None
     bar = build_progress(console, "{task.completed:.1f}/{task.total:g} s", fleeting=True)
     with bar:
-        task = bar.add_task("walking", total=change.config.world.seconds)
+        task = bar.add_task("walking", total=change.config.world.duration)
         for tick in walk_branch(recording, config, predictor, change):
             walked += [] if tick.truth is None else [tick.truth]
             happened += tick.events

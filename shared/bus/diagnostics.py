@@ -6,10 +6,10 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
+from quadriga.shared.about import HERE, READY, STAGES, STARTED, WARMING_UP, About
+from quadriga.shared.about import REFUSED as NOT_GRANTED
 from quadriga.shared.errors import BusError
 from quadriga.shared.members import SIM, Member
-from quadriga.shared.wire.about import HERE, READY, STAGES, STARTED, WARMING_UP, About
-from quadriga.shared.wire.about import REFUSED as NOT_GRANTED
 
 GOOD: Final = "good"
 NOTE: Final = "note"  # worth knowing, and nothing is wrong
@@ -31,7 +31,9 @@ NOT_REALTIME: Final = "not-realtime"
 CLOCK_LIMIT: Final = 0.1  # s, by which system clocks may differ: recordings are read by them
 PACE_LIMIT: Final = 1e-3  # s, by which those of plants may that pace their robots by them
 CLOCK_REMEDY: Final = "keep the clocks of all computers by PTP (ptp4l, phc2sys) or chrony"
-_PACED: Final = frozenset({'team.plants="each"', 'world.mode="realtime"'})  # of the configuration
+_PACED: Final = frozenset(
+    {"team.plant_per_robot=true", 'world.mode="realtime"'}
+)  # of the configuration
 # In what processes may differ, in the order in which it is told, and what to do about it.
 REMEDIES: Final[Mapping[str, str]] = {
     "version": "install the same version of quadriga on all computers",

@@ -11,6 +11,7 @@ import sys
 from collections.abc import Callable, Collection
 from typing import Final
 
+from quadriga.shared.about import ABOUT, STAGES, About
 from quadriga.shared.bus.diagnostics import (
     MemberAnswer,
     TeamNorm,
@@ -23,12 +24,11 @@ from quadriga.shared.bus.endpoint import describe_way
 from quadriga.shared.bus.membership import first_predicting, lead, members, processes
 from quadriga.shared.bus.process_info import ProcessInfo, describe_process
 from quadriga.shared.bus.session import HERE, READY, Bus, pause
+from quadriga.shared.codec import decode
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError, MessageError
 from quadriga.shared.members import LEADS, OPERATOR, RECORDER, SIM, has_lead
 from quadriga.shared.runtime.clock import monotonic, sleep
-from quadriga.shared.wire.about import ABOUT, STAGES, About
-from quadriga.shared.wire.codec import decode
 
 Pause = Callable[[], None]
 Answered = dict[str, list[MemberAnswer]]

@@ -10,12 +10,12 @@ from typing import Final, NamedTuple
 from quadriga.shared.bus.discovery import log
 from quadriga.shared.bus.membership import lead
 from quadriga.shared.bus.session import HERE, Bus
+from quadriga.shared.codes import LEAD_GONE, LINK_LOST
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import waits_for_router
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.members import has_lead
 from quadriga.shared.runtime.clock import monotonic, wall_ns
-from quadriga.shared.wire.codes import LEAD_GONE, LINK_LOST
 
 _MISSED: Final = re.compile(r", missed since (\S+Z),")
 LAST_PACKETS: Final = 1.0  # s wall, in which what was sent before may still arrive

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import LEADS, PLANNER, Member, team_members
 from quadriga.shared.planner_kinds import find_kind
-from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.robots.conventions import robot_names
 
 
 def processes(config: Config) -> tuple[Member, ...]:
@@ -17,8 +17,8 @@ def processes(config: Config) -> tuple[Member, ...]:
         robot_names(config.team.robots),
         central=find_kind(config.planner.kind).central,
         recorded=config.recorder.enabled,
-        plant_each=config.team.plants == "each",
-        foreign=bool(config.team.controller),
+        plant_each=config.team.plant_per_robot,
+        foreign=bool(config.team.agent_command),
     )
 
 

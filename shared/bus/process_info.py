@@ -7,7 +7,9 @@ import socket
 from dataclasses import replace
 from typing import Final
 
+from quadriga.shared.about import ABOUT, STARTED, About, scheduling_of, stage_of
 from quadriga.shared.bus.session import HERE, Bus
+from quadriga.shared.codec import encode
 from quadriga.shared.config.agreed import agreed_keys
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import RECORDER
@@ -19,9 +21,7 @@ from quadriga.shared.runtime.installed import (
     project_version,
 )
 from quadriga.shared.runtime.scheduling import REALTIME, has_priority
-from quadriga.shared.wire.about import ABOUT, STARTED, About, scheduling_of, stage_of
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.schema import message_forms
+from quadriga.shared.schema import message_forms
 
 _NO_LIBRARY: Final = ("machine", PROJECT)
 

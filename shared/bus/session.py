@@ -13,6 +13,8 @@ from typing import Any, Final, Self
 
 import zenoh
 
+from quadriga.shared.about import HERE as HERE
+from quadriga.shared.about import READY as READY
 from quadriga.shared.bus.endpoint import check_trust, tls_of
 from quadriga.shared.bus.membership import Presence
 from quadriga.shared.bus.ring_buffer import INBOX, Mailbox, Newest
@@ -23,9 +25,7 @@ from quadriga.shared.config.sections import BusConfig
 from quadriga.shared.errors import BusError
 from quadriga.shared.members import ROUTER
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns, sleep, wall_ns
-from quadriga.shared.wire.about import HERE as HERE
-from quadriga.shared.wire.about import READY as READY
-from quadriga.shared.wire.topics import RECEIVED
+from quadriga.shared.topics import RECEIVED
 
 Packet = tuple[str, bytes]  # key, payload as received
 Arrival = tuple[int, str, bytes]  # when, ns of `monotonic_ns`, and the packet

@@ -21,8 +21,8 @@ from quadriga.shared.config.terrains import TERRAINS
 from quadriga.shared.controller_line import parse_line
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.planner_kinds import NO_PLANNER, find_kind, read_options
-from quadriga.shared.robot.conventions import robot_names
-from quadriga.shared.wire.topics import SAMPLE_MS
+from quadriga.shared.robots.conventions import robot_names
+from quadriga.shared.topics import SAMPLE_MS
 
 _TEAM_NAME: Final = re.compile(r"[A-Za-z0-9_.-]{1,64}")
 _PAIRS: Final = (
@@ -170,20 +170,20 @@ def _check_plants(config: Config) -> None:
     team = config.team
     if team.plant == BRIDGED:
         _check_bridged(config)
-    if team.plants == "one":
+    if not team.plant_per_robot:
         return
     if config.estimator.kind == "truth":
         raise ConfigError(
             "estimator.kind",
-            "'truth' with team.plants 'each'",
-            "'kalman', or team.plants = 'one'",
+            "'truth' with team.plant_per_robot = true",
+            "'kalman', or team.plant_per_robot = false",
             "the plant of one robot does not know where all are",
         )
     if team.plant == SIMULATED and team.robots > 1 and team.yokes != "none":
         raise ConfigError(
-            "team.plants",
-            f"'each' with simulated robots and {team.yokes!r} yokes",
-            "team.yokes = 'none', or team.plants = 'one'",
+            "team.plant_per_robot",
+            f"true with simulated robots and {team.yokes!r} yokes",
+            "team.yokes = 'none', or team.plant_per_robot = false",
             "robots that are simulated in worlds of their own cannot pull at each other",
         )
 
@@ -191,24 +191,29 @@ def _check_plants(config: Config) -> None:
 def _check_bridged(config: Config) -> None:
     """Robots have a bridge each, and their own time."""
     for name, value, wanted, cause in (
-        ("team.plants", config.team.plants, "each", "every robot has a bridge of its own"),
+        (
+            "team.plant_per_robot",
+            str(config.team.plant_per_robot).lower(),
+            "true",
+            "every robot has a bridge of its own",
+        ),
         ("world.mode", config.world.mode, "realtime", "robots do not wait for a command"),
     ):
         if value != wanted:
-            raise ConfigError(name, f"{value!r} with team.plant {BRIDGED!r}", repr(wanted), cause)
+            raise ConfigError(name, f"{value} with team.plant {BRIDGED!r}", wanted, cause)
 
 
 def _check_controller(config: Config) -> None:
     """A controller of one's own has a command line, and nobody else plans for its robots."""
-    line, kind = config.team.controller, config.planner.kind
+    line, kind = config.team.agent_command, config.planner.kind
     if not line:
         return
     parse_line(line)
     if kind != NO_PLANNER:
         raise ConfigError(
             "planner.kind",
-            f"{kind!r} with team.controller {line!r}",
-            f"{NO_PLANNER!r}, or team.controller = ''",
+            f"{kind!r} with team.agent_command {line!r}",
+            f"{NO_PLANNER!r}, or team.agent_command = ''",
             "a controller of one's own takes the place of agents and planners",
         )
 

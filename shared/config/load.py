@@ -10,6 +10,7 @@ from dataclasses import Field, fields
 from pathlib import Path
 from typing import Any, Final
 
+from quadriga.shared.codec import truncate_text
 from quadriga.shared.config.check import check
 from quadriga.shared.config.presets import PRESETS, preset_keys
 from quadriga.shared.config.reference_trace import ROW_END, inline_trace
@@ -17,8 +18,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.controller_line import KEY as CONTROLLER
 from quadriga.shared.errors import ConfigError, did_you_mean, name_file_errors
 from quadriga.shared.planner_kinds import NO_PLANNER
-from quadriga.shared.robot.robots import ROBOTS
-from quadriga.shared.wire.codec import truncate_text
+from quadriga.shared.robots.registry import ROBOTS
 
 _SHOWN: Final = 200  # characters of a value that is wrong
 _LARGEST: Final = 1 << 22  # bytes of a file: of a reference's trace, which has a line of its own
@@ -125,7 +125,7 @@ def _with_robots_values(given: Mapping[str, Any]) -> Mapping[str, Any]:
 def _without_planner(given: Mapping[str, Any]) -> Mapping[str, Any]:
     """`given` with no planner beneath where a controller of one's own takes the agents' place."""
     team, planner = given.get("team", {}), given.get("planner", {})
-    controlled = isinstance(team, dict) and team.get("controller")
+    controlled = isinstance(team, dict) and team.get("agent_command")
     if not controlled or not isinstance(planner, dict):
         return given
     return {**given, "planner": {"kind": NO_PLANNER, **planner}}

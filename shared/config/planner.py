@@ -100,7 +100,7 @@ class PlannerConfig:
         "largest planned deviation of z, vx, vy, roll, pitch, wz from what is commanded",
         low=1e-6,
     )
-    fade: tuple[float, ...] = key(
+    trust_range: tuple[float, ...] = key(
         (0.06, 0.5, 0.25, 2.0),
         "m, m/s, rad, rad/s",
         "the plan fades out as the state leaves this range of the data",

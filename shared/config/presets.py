@@ -47,7 +47,7 @@ _PAPER_PLANNER: Final = MappingProxyType(
         "interface": "force", "tracked": "outputs", "latency_ms": 0, "compensation": False,
         "damping": 0.0,
         "Q": (1e6, 1e5, 1e5, 2e5, 1e5, 1e4), "R": (0.05, 0.05, 0.5),
-        "deviation_max": (1e4, 1e4, 1e4), "fade": (1e6, 1e6, 1e6, 1e6),
+        "deviation_max": (1e4, 1e4, 1e4), "trust_range": (1e6, 1e6, 1e6, 1e6),
     }
 )  # fmt: skip
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from quadriga.shared.config.sections import Config, ReferenceConfig
 from quadriga.shared.errors import ConfigError, name_file_errors
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.places import scenario_folder
 
 COLUMNS: Final = ("t", "vx", "vy", "wz")

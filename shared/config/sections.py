@@ -21,8 +21,8 @@ from quadriga.shared.config.team import (
 )
 from quadriga.shared.config.world import WorldConfig
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot.robots import ROBOTS
-from quadriga.shared.robot.spec import RobotSpec
+from quadriga.shared.robots.registry import ROBOTS
+from quadriga.shared.robots.spec import RobotSpec
 
 __all__ = [
     "BRIDGED",

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from quadriga.shared.config.key import key
-from quadriga.shared.robot.robots import ROBOTS
+from quadriga.shared.robots.registry import ROBOTS
 
 SIMULATED: Final = "mujoco"  # the kind of plant that is a simulated world
 BRIDGED: Final = "robots"  # the kind that is robots of their own, each behind a bridge
@@ -51,13 +51,12 @@ class TeamConfig:
         "what the robots are: mujoco; robots: real ones behind bridges; or a kind that an "
         "installed package adds",
     )
-    plants: str = key(
-        "one",
+    plant_per_robot: bool = key(
+        False,
         "-",
-        "one: a single process is the plant of all robots; each: every robot has one of its own",
-        choices=("one", "each"),
+        "true: every robot has a plant of its own; false: a single process is the plant of all",
     )
-    controller: str = key(
+    agent_command: str = key(
         "",
         "-",
         "command line of a program of one's own that is the agent of each robot, see "
@@ -67,7 +66,7 @@ class TeamConfig:
     @property
     def one_world(self) -> bool:
         """Whether the plant is one simulated world of all robots: it knows the truth of all."""
-        return self.plant == SIMULATED and self.plants == "one"
+        return self.plant == SIMULATED and not self.plant_per_robot
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,7 +143,7 @@ class RuntimeConfig:
         "QUADRIGA_PRIORITY of the environment overrides it",
         choices=("realtime", "ordinary"),
     )
-    refuse_overload: bool = key(
+    check_cpu: bool = key(
         True,
         "-",
         "realtime: refuse to begin on a computer that the agents' ticks alone would keep busier "

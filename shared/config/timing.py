@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from quadriga.shared.config.sections import BRIDGED, Config
 from quadriga.shared.planner_kinds import find_kind
-from quadriga.shared.wire.topics import (
+from quadriga.shared.topics import (
     CLOCK,
     COMMAND,
     CONFIGURED,
@@ -27,7 +27,7 @@ def periods(config: Config) -> dict[str, int]:
     """
     lockstep = config.world.mode == "lockstep"
     configured = {
-        CLOCK: 1 if lockstep and config.team.plants == "each" else SAMPLE_MS,
+        CLOCK: 1 if lockstep and config.team.plant_per_robot else SAMPLE_MS,
         PLAN: SAMPLE_MS * config.planner.applied,
         STATUS: STATUS_MS if lockstep else 0,
         TRUTH: 1 if config.estimator.kind == "truth" else SAMPLE_MS,
@@ -47,7 +47,7 @@ def waits_for_router(config: Config) -> bool:
     In lock-step a message that is lost would not be sent again. Where each robot has a plant of its
     own, none goes on without the others.
     """
-    realtime, alone = config.world.mode == "realtime", config.team.plants == "one"
+    realtime, alone = config.world.mode == "realtime", not config.team.plant_per_robot
     return config.bus.mode == "client" and realtime and alone
 
 

@@ -19,9 +19,9 @@ class WorldConfig:
         choices=("lockstep", "realtime"),
     )
     seed: int = key(0, "-", "seed of terrain, noise and everything else random", low=0, high=2**31)
-    seconds: float = key(20.0, "s", "world time to walk", low=0.5, high=3600.0)
+    duration: float = key(20.0, "s", "world time to walk", low=0.5, high=3600.0)
     scenario: str = key("", "-", "name of the scenario these keys come from: a label only")
-    spawn: str = key(
+    initial_posture: str = key(
         "standing",
         "-",
         "how simulated robots begin: standing, or lying on their feet with folded legs",

@@ -14,7 +14,7 @@ from quadriga.shared.planner_kinds import stand_in
 from quadriga.shared.printable import printable_line
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.recording.recover import DamagedRecording
-from quadriga.shared.robot.robots import ROBOTS
+from quadriga.shared.robots.registry import ROBOTS
 
 PLUGIN: Final = (
     "planner"  # in the metadata: what is known of the planner's kind without its package

@@ -6,8 +6,8 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from quadriga.shared.wire.codec import MAX_BYTES
-from quadriga.shared.wire.topics import find_topic
+from quadriga.shared.codec import MAX_BYTES
+from quadriga.shared.topics import find_topic
 
 LARGEST: Final = MAX_BYTES  # bytes of a payload: a larger one is no message to anybody
 MAX_KEYS: Final = 32_768  # of a file: its format counts them with 16 bits

@@ -25,11 +25,11 @@ from mcap.reader import make_reader
 from mcap.records import Channel, Chunk, Footer, Metadata, Schema
 from mcap.writer import MCAP0_MAGIC
 
+from quadriga.shared.codec import decode, envelope
 from quadriga.shared.errors import RecordingError, name_file_errors
+from quadriga.shared.messages import Message
 from quadriga.shared.recording.metadata import PROFILE, newer_format_error, unseal
-from quadriga.shared.wire.codec import decode, envelope
-from quadriga.shared.wire.messages import Message
-from quadriga.shared.wire.topics import TABLE, find_topic, topic_of
+from quadriga.shared.topics import TABLE, find_topic, topic_of
 
 M = TypeVar("M", bound=Message)
 

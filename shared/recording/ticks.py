@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
+from quadriga.shared.codec import decode
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
-from quadriga.shared.robot.conventions import robot_names
-from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.messages import Consumed
-from quadriga.shared.wire.topics import COMMAND, INPUTS
+from quadriga.shared.messages import Consumed
+from quadriga.shared.robots.conventions import robot_names
+from quadriga.shared.topics import COMMAND, INPUTS
 
 _JUMP: Final = 600_000  # ms: a longer jump is another clock or a forged tick, not a loss
 _KEPT: Final = 1000  # gaps that are remembered one by one

@@ -35,13 +35,13 @@ from mcap.records import (
 )
 from mcap.writer import MCAP0_MAGIC
 
+from quadriga.shared.codec import envelope
 from quadriga.shared.errors import RecordingError, system_reason
 from quadriga.shared.recording.metadata import COUNTS, LOST, PROFILE, SINCE, seal
 from quadriga.shared.recording.quota import Quota
 from quadriga.shared.recording.ticks import TickTrack, lost_by_key
-from quadriga.shared.wire.codec import envelope
-from quadriga.shared.wire.schema import json_schema
-from quadriga.shared.wire.topics import TABLE, Topic, find_topic
+from quadriga.shared.schema import json_schema
+from quadriga.shared.topics import TABLE, Topic, find_topic
 
 _UNKNOWN: Final = f"{PROFILE}.unknown"
 _MESSAGE: Final = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log, publish

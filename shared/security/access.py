@@ -18,14 +18,14 @@ from math import prod
 from typing import Any, Final
 
 from quadriga.shared import members
+from quadriga.shared.about import QUESTIONS
+from quadriga.shared.codec import MAX_BYTES, MAX_TEXT
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import AGENT, DOCTOR, LEADS, OBSERVER, RECORDER, ROLES, ROUTER
-from quadriga.shared.robot.conventions import robot_names
-from quadriga.shared.wire.about import QUESTIONS
-from quadriga.shared.wire.codec import MAX_BYTES, MAX_TEXT
-from quadriga.shared.wire.messages import Message
-from quadriga.shared.wire.topic import Topic
-from quadriga.shared.wire.topics import CLOCK, ESTOP, RECEIVED, STATE, STATUS, TABLE, TRUTH
+from quadriga.shared.messages import Message
+from quadriga.shared.robots.conventions import robot_names
+from quadriga.shared.topic import Topic
+from quadriga.shared.topics import CLOCK, ESTOP, RECEIVED, STATE, STATUS, TABLE, TRUTH
 
 _SPEAKERS: Final = (members.ESTOP, members.STOP, members.RESET, members.RESUME)
 _OTHERS: Final = (members.LAUNCHER, *_SPEAKERS, DOCTOR, OBSERVER, ROUTER)
@@ -81,7 +81,7 @@ def team_identities(config: Config) -> tuple[Identity, ...]:
         robot_names(config.team.robots),
         central=True,
         recorded=True,
-        plant_each=config.team.plants == "each",
+        plant_each=config.team.plant_per_robot,
     )
     foreign = {name for topic in TABLE for name in (*topic.senders, *topic.receivers)}
     foreign -= {*_OTHERS, *(role.name for role in ROLES)}

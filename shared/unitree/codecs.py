@@ -16,7 +16,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from quadriga.shared.robot.conventions import N_JOINTS
+from quadriga.shared.robots.conventions import N_JOINTS
 from quadriga.shared.unitree.packets import (
     FOOT_PLACES,
     JOINT_PLACES,

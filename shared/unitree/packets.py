@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadriga.shared.errors import ConfigError, QuadrigaError
-from quadriga.shared.robot.conventions import N_JOINTS, N_LEGS, Array
+from quadriga.shared.robots.conventions import N_JOINTS, N_LEGS, Array
 
 SERVO: Final = 0x0A  # of A1 and Go1: the motor follows its command
 ON: Final = 0x01  # the same of the Go2

@@ -18,7 +18,8 @@ import numpy as np
 
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot.conventions import N_JOINTS, Array, robot_names
+from quadriga.shared.messages import Command, State
+from quadriga.shared.robots.conventions import N_JOINTS, Array, robot_names
 from quadriga.shared.unitree import rpc
 from quadriga.shared.unitree.codecs import CODECS, GO2, Codec
 from quadriga.shared.unitree.dds import (
@@ -40,7 +41,6 @@ from quadriga.shared.unitree.packets import (
 )
 from quadriga.shared.unitree.rpc import RpcEnd, RpcMessage
 from quadriga.shared.unitree.udp import Address, UdpPort, parse_address
-from quadriga.shared.wire.messages import Command, State
 from quadriga.sim_server.emulator.link import NO_FAULTS, Link, Parcel
 
 _STREAM: Final = 11  # of the world's seed

@@ -28,14 +28,14 @@ import numpy as np
 
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError, name_file_errors
+from quadriga.shared.messages import Command, Truth
 from quadriga.shared.printable import printable_line
-from quadriga.shared.robot.conventions import GRAVITY, JOINT_NAMES, Array
+from quadriga.shared.robots.conventions import GRAVITY, JOINT_NAMES, Array
 from quadriga.shared.runtime.clock import Rate
 from quadriga.shared.runtime.collector import end_collection
 from quadriga.shared.runtime.scheduling import take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
 from quadriga.shared.unitree.packets import parse_buttons, remote_bytes
-from quadriga.shared.wire.messages import Command, Truth
 from quadriga.sim_server.emulator.board import Board, open_boards
 from quadriga.sim_server.world import layout
 from quadriga.sim_server.world.world import World
@@ -70,7 +70,7 @@ def run(config: Config, *, hung: bool = False, truth: Path | None = None) -> Non
         BridgeError: a port is taken, or there is no such interface.
     """
     stopped = stop_on_signals()
-    world = World(replace(config, world=replace(config.world, spawn="lying")))
+    world = World(replace(config, world=replace(config.world, initial_posture="lying")))
     harness = Harness(world) if hung else None
     with ExitStack() as stack:
         log = None

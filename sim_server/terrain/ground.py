@@ -12,7 +12,7 @@ import numpy as np
 from scipy import ndimage
 
 from quadriga.shared.config.world import WorldConfig
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from quadriga.sim_server.terrain.relief import (
     EARTH,
     TERRAIN_CONTACT,

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadriga.shared.config.world import WorldConfig
-from quadriga.shared.robot.conventions import N_LEGS, Array
+from quadriga.shared.robots.conventions import N_LEGS, Array
 from quadriga.sim_server.terrain.relief import STONE_CONTACT, Course, Rectangle, Relief, Stones
 
 _SIZES: Final = (0.5, 0.67, 0.83, 1.0)  # of the largest

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from quadriga.shared.config.reference_trace import trace_of
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 
 # Two geoms touch if one's `contype` has a bit of the other's `conaffinity`. The ground has bit 1,
 # to which robots answer; loose stones touch ground, robots and each other by a second bit of their
@@ -205,7 +205,7 @@ def build_course(config: Config, places: Array) -> Course:
     """The course of a configuration: its reference integrated over the walk, with some margin.
 
     Args:
-        config: the configuration; `reference` determines the way, `world.seconds` its length.
+        config: the configuration; `reference` determines the way, `world.duration` its length.
         places: spawn positions of the trunks, shape (n, 2), m.
     """
     low, high = places.min(axis=0) - _HALF_BODY, places.max(axis=0) + _HALF_BODY
@@ -244,10 +244,10 @@ def _way(config: Config) -> Array:
     ref, trace = config.reference, trace_of(config)
     if trace is None:
         longest = _LONGEST_WAY / max(math.hypot(ref.vx, ref.vy), 0.1)
-        times = np.arange(0.0, min(config.world.seconds, longest), _STEP)
+        times = np.arange(0.0, min(config.world.duration, longest), _STEP)
         vx, vy, yaw = ref.vx, ref.vy, ref.wz * times
     else:
-        times = np.arange(0.0, config.world.seconds, _STEP)
+        times = np.arange(0.0, config.world.duration, _STEP)
         vx, vy, wz = np.array([trace.at(t) for t in times.tolist()]).T
         yaw = np.cumsum(_STEP * wz)
     step = _STEP * np.stack(

@@ -13,7 +13,7 @@ import numpy as np
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.terrains import TERRAINS
 from quadriga.shared.config.world import WorldConfig
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from quadriga.sim_server.terrain.relief import (
     GROUND_OF_STONES,
     PLANE,

@@ -15,12 +15,12 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from quadriga.shared import codes
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError, did_you_mean
-from quadriga.shared.robot.conventions import JOINT_NAMES, N_JOINTS, Array, Leg, robot_names
-from quadriga.shared.robot.spec import RobotSpec
-from quadriga.shared.wire import codes
-from quadriga.shared.wire.messages import Command, Event, Flat, State
+from quadriga.shared.messages import Command, Event, Flat, State
+from quadriga.shared.robots.conventions import JOINT_NAMES, N_JOINTS, Array, Leg, robot_names
+from quadriga.shared.robots.spec import RobotSpec
 
 OFF: Final = "off"
 STUCK: Final = "stuck"

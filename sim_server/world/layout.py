@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from quadriga.shared.robot.conventions import N_JOINTS, N_LEGS
+from quadriga.shared.robots.conventions import N_JOINTS, N_LEGS
 
 POSITION: Final = slice(0, 3)  # of `qpos`: trunk origin, world, m
 ATTITUDE: Final = slice(3, 7)  # of `qpos`: trunk to world, quaternion wxyz

@@ -28,11 +28,11 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from quadriga.shared.config.motors import MotorsConfig
-from quadriga.shared.robot.conventions import N_JOINTS, N_LEGS, Array
-from quadriga.shared.robot.spec import RobotSpec
-from quadriga.shared.robot.torque_speed import MotorCurves, motor_curves, torque_range
+from quadriga.shared.messages import Command
+from quadriga.shared.robots.conventions import N_JOINTS, N_LEGS, Array
+from quadriga.shared.robots.spec import RobotSpec
+from quadriga.shared.robots.torque_speed import MotorCurves, motor_curves, torque_range
 from quadriga.shared.runtime.jit import compiled
-from quadriga.shared.wire.messages import Command
 from quadriga.sim_server.world.layout import JOINT_POSITIONS, JOINT_RATES
 
 _TICK: Final = 1e-3  # s

@@ -11,8 +11,8 @@ import numpy as np
 
 from quadriga.shared.config.motors import MotorsConfig
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot.conventions import FOOT_FRAMES, JOINT_NAMES, Array
-from quadriga.shared.robot.spec import RobotSpec
+from quadriga.shared.robots.conventions import FOOT_FRAMES, JOINT_NAMES, Array
+from quadriga.shared.robots.spec import RobotSpec
 from quadriga.sim_server.terrain.relief import LEG_CONTACT, NO_CONTACT, ROBOT_CONTACT
 
 TRUNK: Final = "trunk"  # the trunk's body and box, whatever the URDF calls its link

@@ -9,13 +9,13 @@ from typing import Final
 
 import numpy as np
 
+from quadriga.shared import codes
 from quadriga.shared.config.payload import carriers
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.terrains import TERRAINS
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot.conventions import JOINT_NAMES, N_JOINTS, Array, robot_names
-from quadriga.shared.wire import codes
-from quadriga.shared.wire.messages import Event
+from quadriga.shared.messages import Event
+from quadriga.shared.robots.conventions import JOINT_NAMES, N_JOINTS, Array, robot_names
 
 _PUSHES, _MOTORS, _LOADS = 3, 4, 5  # streams of the seed: a new push changes no motor
 _PUSH: Final = "'robot:force[N]:direction[deg]:start[s]:duration[s]', commas between pushes"
@@ -186,7 +186,7 @@ def push_series(config: Config, random: np.random.Generator) -> tuple[Push, ...]
     every, duration = round(1000 * world.push_every), round(1000 * world.push_duration)
     first = int(random.integers(n))
     pushes = []
-    for k, due in enumerate(range(every, round(1000 * world.seconds), every)):
+    for k, due in enumerate(range(every, round(1000 * world.duration), every)):
         left, share, late = random.random(3)
         start = due + int(late * 2 * config.gait.stance_ms)
         force = world.push_force * (1.0 + world.push_spread * (2.0 * share - 1.0))

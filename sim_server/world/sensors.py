@@ -10,9 +10,9 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from quadriga.shared.config.sections import SensorsConfig
-from quadriga.shared.robot.conventions import N_JOINTS, N_LEGS, Array
+from quadriga.shared.messages import State
+from quadriga.shared.robots.conventions import N_JOINTS, N_LEGS, Array
 from quadriga.shared.runtime.jit import compiled
-from quadriga.shared.wire.messages import State
 from quadriga.sim_server.world.layout import (
     ATTITUDE,
     FOOT_FORCES,

@@ -12,8 +12,8 @@ import numpy as np
 from quadriga.shared.config.friction import friction_of_robots
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.yokes import yoke_pairs
-from quadriga.shared.robot.colours import robot_rgb
-from quadriga.shared.robot.conventions import FOOT_FRAMES, GRAVITY, Array, robot_names
+from quadriga.shared.robots.colours import robot_rgb
+from quadriga.shared.robots.conventions import FOOT_FRAMES, GRAVITY, Array, robot_names
 from quadriga.sim_server.terrain.relief import NO_CONTACT
 from quadriga.sim_server.terrain.terrain import Terrain, build_terrain
 from quadriga.sim_server.world.layout import JOINT_POSITIONS, NQ
@@ -107,7 +107,7 @@ def build_team_model(
     friction = friction_of_robots(config.world.friction_of, config.world.friction, team)
     robot = config.robot
     body = RobotBody(robot, config.motors, leg_collisions=config.world.leg_collisions)
-    lying = config.world.spawn == "lying"
+    lying = config.world.initial_posture == "lying"
     height = robot.lying_height if lying else robot.stand_height
     for name, i in robots.items():
         place = (*places[i], height)

@@ -12,11 +12,11 @@ import numpy as np
 
 from quadriga.plant.late import damp_joints
 from quadriga.plant.protocol import Plant
+from quadriga.shared.codes import FALL, FAULT_ASKED, LIES, UNSTABLE
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot.conventions import FOOT_FRAMES, N_JOINTS, N_LEGS, Array
-from quadriga.shared.wire.codes import FALL, FAULT_ASKED, LIES, UNSTABLE
-from quadriga.shared.wire.messages import Command, Event, State, Truth
+from quadriga.shared.messages import Command, Event, State, Truth
+from quadriga.shared.robots.conventions import FOOT_FRAMES, N_JOINTS, N_LEGS, Array
 from quadriga.sim_server.terrain.relief import FOLLOW_MS
 from quadriga.sim_server.world import layout
 from quadriga.sim_server.world.faults import Injection, with_time

@@ -13,7 +13,7 @@ from quadriga.agents.planner.peer_terms import PeerTerms
 from quadriga.agents.planner.planner import Planner, PlannerInputs, PlanResult
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from tests.a1 import WEIGHT, nominal_forces
 
 Team = Callable[..., Any]

@@ -10,10 +10,10 @@ import numpy as np
 from quadriga.agents.agent import Agent, AgentState, Inputs, Outputs
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.identification.rollout import Rollout
+from quadriga.shared.codec import decode, encode
 from quadriga.shared.config.sections import Config, PlannerConfig, TeamConfig
-from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
-from quadriga.shared.wire.codec import decode, encode
-from quadriga.shared.wire.messages import Reference, State
+from quadriga.shared.messages import Reference, State
+from quadriga.shared.robots.conventions import N_FORCES, N_OUTPUTS, Array
 
 CONFIG = Config(team=TeamConfig(robots=2), planner=PlannerConfig(latency_ms=0))
 FIRST_PLAN = 320  # ms: the first multiple of 40 ms after the stand of 300 ms

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from quadriga.agents.agent import Agent, AgentState, Inputs, Outputs
+from quadriga.shared.codec import encode
 from quadriga.shared.config.sections import Config, TeamConfig
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.messages import Reference, State
+from quadriga.shared.messages import Reference, State
 from tests.a1 import standing
 from tests.agents.duet import asked, over_the_bus, simple_predictor
 

@@ -17,9 +17,9 @@ from quadriga.agents.agent import Agent
 from quadriga.agents.gait import scheduled_stance
 from quadriga.agents.planning.interface import Expected
 from quadriga.identification.rollout import Rollout
+from quadriga.shared.codec import decode, encode
 from quadriga.shared.config.load import load
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.wire.codec import decode, encode
+from quadriga.shared.robots.conventions import Array
 from tests.a1 import TORQUE_LIMIT, nominal_forces
 from tests.agents.duet import (
     CONFIG,

@@ -12,10 +12,10 @@ from quadriga.agents.controller.whole_body.limited import LIMITED
 from quadriga.agents.controller.whole_body.problem import WholeBodySolution
 from quadriga.agents.telemetry import Telemetry
 from quadriga.agents.validate import AGREES_MS, HOLD_MS
-from quadriga.shared.robot.conventions import GRAVITY, Array
-from quadriga.shared.wire.codec import decode, encode
-from quadriga.shared.wire.codes import OPERATOR_BACK, OPERATOR_GONE
-from quadriga.shared.wire.messages import Command, EStop, Event, State, Status
+from quadriga.shared.codec import decode, encode
+from quadriga.shared.codes import OPERATOR_BACK, OPERATOR_GONE
+from quadriga.shared.messages import Command, EStop, Event, State, Status
+from quadriga.shared.robots.conventions import GRAVITY, Array
 from tests.a1 import standing
 from tests.agents.duet import CONFIG, FIRST_PLAN, over_the_bus
 from tests.agents.lone_robot import ALONE, Robot, is_damping, lean, tilted

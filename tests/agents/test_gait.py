@@ -16,7 +16,7 @@ from quadriga.agents.gait import (
     stance_progress,
 )
 from quadriga.shared.config.sections import Config, GaitConfig
-from quadriga.shared.robot.conventions import GRAVITY, Leg
+from quadriga.shared.robots.conventions import GRAVITY, Leg
 from tests.a1 import TOTAL_MASS, nominal_forces
 
 GAITS = st.builds(

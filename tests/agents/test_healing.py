@@ -21,9 +21,9 @@ from quadriga.agents.healing import (
 from quadriga.agents.modes import COMMANDED, LOSSES, STAND, STOPPING, WALK, Mode
 from quadriga.agents.validate import AGREES_MS
 from quadriga.identification.rollout import Rollout
+from quadriga.shared.codes import HALTS, INPUT_LOST, RESUMED
 from quadriga.shared.config.sections import Config
-from quadriga.shared.wire.codes import HALTS, INPUT_LOST, RESUMED
-from quadriga.shared.wire.messages import EStop, Resume, SafeStop
+from quadriga.shared.messages import EStop, Resume, SafeStop
 from tests.agents.duet import CONFIG, asked, every_100_ms, simple_predictor
 from tests.agents.lone_robot import ALONE, Robot, tilted
 

@@ -21,7 +21,7 @@ ALONE = Config(team=TeamConfig(robots=1))
 FIRST_CALLS = """
 from quadriga.agents.agent import Agent
 from quadriga.agents.rehearsal import rehearse
-from quadriga.shared.wire import flat_bytes
+from quadriga.shared import flat_bytes
 from quadriga.shared.config.sections import Config, TeamConfig
 from quadriga.sim_server.world import motors
 from quadriga.plant.commands import CommandBox

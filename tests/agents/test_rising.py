@@ -12,9 +12,9 @@ from quadriga.agents.modes import DAMPING, ESTOP, RISING, STAND, STOPPING, WALK,
 from quadriga.agents.rising import Rise, Rising
 from quadriga.plant.late import damp_joints
 from quadriga.plant.lost import LostCommands
+from quadriga.shared.codes import BACK, LIES, LOWERED
 from quadriga.shared.config.load import load
-from quadriga.shared.wire.codes import BACK, LIES, LOWERED
-from quadriga.shared.wire.messages import EStop, Event, Reset, State
+from quadriga.shared.messages import EStop, Event, Reset, State
 from quadriga.sim_server.world.world import World
 from tests.a1 import standing
 from tests.sim_server.standing import stand
@@ -53,7 +53,7 @@ def test_it_gets_up_after_its_motors_were_led_down(
 
 @pytest.mark.parametrize("keys", [{"world.mode": "lockstep"}, {"team.plant": "robots"}])
 def test_never_in_lockstep_and_never_a_real_robot(keys: dict[str, str]) -> None:
-    each = {"team.plants": "each", "team.yokes": "none"} if "team.plant" in keys else {}
+    each = {"team.plant_per_robot": True, "team.yokes": "none"} if "team.plant" in keys else {}
     given = {"team.robots": 1, "world.mode": "realtime", "planner.kind": "none"}
     rising = Rising(load(None, given | each | keys))
     assert not rising.why_now(Mode(STAND, 0), -1, FROM, None, None)
@@ -182,7 +182,7 @@ def test_who_is_damped_gets_up_when_the_operator_releases_it_by_name(walk: str, 
 
 
 def test_a_real_robot_is_not_released_over_the_bus() -> None:
-    keys = {"team.plant": "robots", "team.plants": "each", "team.yokes": "none"}
+    keys = {"team.plant": "robots", "team.plant_per_robot": True, "team.yokes": "none"}
     given = {"team.robots": 1, "world.mode": "realtime", "planner.kind": "none"}
     assert not Rising(load(None, given | keys)).why_now(STOPPED_WALK, 4999, FROM, RELEASE, None)
 

@@ -12,9 +12,9 @@ from quadriga.agents.agent import Agent, Outputs
 from quadriga.agents.controller.controller import ControllerOutputs, Task
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.config.sections import Config, TeamConfig
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.wire.messages import Plan
-from quadriga.shared.wire.topics import SAMPLE_MS
+from quadriga.shared.messages import Plan
+from quadriga.shared.robots.conventions import Array
+from quadriga.shared.topics import SAMPLE_MS
 from tests.agents.duet import every_100_ms, simple_predictor
 
 ALONE = Config(team=TeamConfig(robots=1))

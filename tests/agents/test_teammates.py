@@ -14,18 +14,10 @@ from quadriga.agents.teammates import (
     concerns_agents,
     has_operator,
 )
+from quadriga.shared.codes import BACK, GONE, LOWERED, OPERATOR_BACK, OPERATOR_GONE, PUSH, SILENT
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
-from quadriga.shared.wire.codes import (
-    BACK,
-    GONE,
-    LOWERED,
-    OPERATOR_BACK,
-    OPERATOR_GONE,
-    PUSH,
-    SILENT,
-)
-from quadriga.shared.wire.messages import Event, Reference, Status
+from quadriga.shared.messages import Event, Reference, Status
 from tests.a1 import standing
 
 KEYS = {"team.robots": 3, "planner.kind": "none"}

@@ -9,7 +9,7 @@ import pytest
 
 from quadriga.agents.agent import Outputs
 from quadriga.agents.telemetry import Telemetry
-from quadriga.shared.wire.messages import Command
+from quadriga.shared.messages import Command
 
 ZERO = np.zeros(12)
 

@@ -48,7 +48,7 @@ def test_what_agents_need_is_held_against_the_cores(
     [
         ({"world.mode": "realtime"}, False, True),
         ({"world.mode": "realtime"}, True, False),
-        ({"world.mode": "realtime", "runtime.refuse_overload": False}, False, False),
+        ({"world.mode": "realtime", "runtime.check_cpu": False}, False, False),
         ({"world.mode": "lockstep"}, False, False),
     ],
 )

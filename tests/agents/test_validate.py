@@ -11,9 +11,9 @@ import pytest
 from quadriga.agents.validate import AGREES_MS, Validated, Validator, standing_torques
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.config.load import load
-from quadriga.shared.robot.a1 import A1
-from quadriga.shared.robot.conventions import GRAVITY, Array
-from quadriga.shared.wire.messages import State
+from quadriga.shared.messages import State
+from quadriga.shared.robots.a1 import A1
+from quadriga.shared.robots.conventions import GRAVITY, Array
 from quadriga.team.operator import references_of
 from tests.a1 import standing
 

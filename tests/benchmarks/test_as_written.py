@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from benchmarks.as_written import DEFAULT, TIGHT, PaperQp
 from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config, PlannerConfig
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from tests.a1 import build_problem, nominal_forces
 
 N = 5

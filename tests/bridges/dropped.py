@@ -17,8 +17,8 @@ import numpy as np
 
 from quadriga.bridges.supervisor import BridgeMode, Request, Supervisor, SupervisorInputs, tilt_of
 from quadriga.shared.config.load import load
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.robot.robots import ROBOTS
+from quadriga.shared.robots.conventions import Array
+from quadriga.shared.robots.registry import ROBOTS
 from quadriga.shared.unitree.packets import SERVO
 from quadriga.sim_server.emulator.board import RobotStatus
 from quadriga.sim_server.world.world import World

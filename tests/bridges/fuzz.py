@@ -27,14 +27,14 @@ from quadriga.bridges.supervisor import (
     SupervisorState,
 )
 from quadriga.plant.commands import MOST_KD, MOST_KP
+from quadriga.shared.codec import decode, encode
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
+from quadriga.shared.messages import Command
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.unitree.codecs import CODECS, GO2, Codec, seal
 from quadriga.shared.unitree.packets import PacketError, RobotReport
 from quadriga.shared.unitree.udp import Address, UdpPort
-from quadriga.shared.wire.codec import decode, encode
-from quadriga.shared.wire.messages import Command
 from tests.bridges.robots import config_of, standing
 from tests.bridges.test_udp_driver import HOST, free_port
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import GRAVITY, Array
+from quadriga.shared.robots.conventions import GRAVITY, Array
 from quadriga.shared.unitree.packets import SERVO, Battery, MotorTargets, RobotReport, remote_bytes
 
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])

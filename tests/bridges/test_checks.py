@@ -10,7 +10,7 @@ import pytest
 
 from quadriga.bridges.checks import Finding, check_reports, refuse_failed
 from quadriga.shared.errors import CheckError
-from quadriga.shared.robot.robots import ROBOTS
+from quadriga.shared.robots.registry import ROBOTS
 from quadriga.shared.unitree.packets import PROTECTED, Battery, RobotReport
 from tests.bridges.robots import config_of, standing, tilted
 

@@ -18,8 +18,8 @@ from quadriga.bridges.joint_test import JointTester, JointVerdict, refuse_wrong,
 from quadriga.bridges.postures import TORQUE, WAY, joint_motion, moving_joint, passive
 from quadriga.bridges.supervisor import BridgeMode, Request, Supervisor, SupervisorInputs
 from quadriga.shared.errors import CheckError
-from quadriga.shared.robot.conventions import JOINT_NAMES, Array
-from quadriga.shared.robot.robots import ROBOTS
+from quadriga.shared.robots.conventions import JOINT_NAMES, Array
+from quadriga.shared.robots.registry import ROBOTS
 from quadriga.shared.unitree.packets import OFF, SERVO, MotorTargets, RobotReport
 from tests.bridges.robots import config_of, pressing, standing
 

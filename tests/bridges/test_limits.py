@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quadriga.bridges.limits import JointReading, joint_limits, limit_targets, shares_of_speed
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from quadriga.shared.unitree.codecs import A1
 from quadriga.shared.unitree.packets import MotorTargets
 from tests.bridges.robots import config_of, holding

@@ -19,11 +19,11 @@ from quadriga.bridges.watchdog import Watchdog
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import CheckError
+from quadriga.shared.messages import Command, Status
 from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.unitree.codecs import A1
 from quadriga.shared.unitree.packets import OFF, SERVO, MotorTargets, RobotReport
 from quadriga.shared.unitree.udp import Address, UdpPort
-from quadriga.shared.wire.messages import Command, Status
 from tests.bridges.robots import config_of, real_go1_counts, standing, tilted
 from tests.bridges.test_udp_driver import HOST, free_port
 
@@ -40,7 +40,7 @@ class Board:
         self.keys = {
             "team.robots": 1,
             "team.plant": "robots",
-            "team.plants": "each",
+            "team.plant_per_robot": True,
             "world.mode": "realtime",
             "bridge.endpoint": f"{HOST}:{here.port}",
             "bridge.listen": f"{HOST}:{listen.port}",

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quadriga.bridges.limits import joint_limits
-from quadriga.shared.robot.motions import posture_at, way_down, way_up
-from quadriga.shared.robot.robots import ROBOTS
+from quadriga.shared.robots.motions import posture_at, way_down, way_up
+from quadriga.shared.robots.registry import ROBOTS
 from tests.bridges.robots import config_of
 
 

@@ -19,9 +19,9 @@ from quadriga.bridges.supervisor import (
     SupervisorState,
     tilt_of,
 )
-from quadriga.shared.robot.conventions import JOINT_NAMES
+from quadriga.shared.messages import Command
+from quadriga.shared.robots.conventions import JOINT_NAMES
 from quadriga.shared.unitree.packets import OFF, PROTECTED, SERVO, Battery
-from quadriga.shared.wire.messages import Command
 from tests.bridges.robots import config_of, pressing, standing, tilted
 
 CONFIG = config_of()

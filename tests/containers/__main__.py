@@ -21,10 +21,10 @@ from benchmarks.slow_motion import read_speed
 from quadriga.recordings.check import check, format_findings
 from quadriga.recordings.gaps import missing_ticks
 from quadriga.recordings.traces import read_traces
+from quadriga.shared import codes
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.runtime.signals import interrupt_on_sigterm
-from quadriga.shared.wire import codes
 from tests.containers.engine import CommandError, Containers, find_engine
 
 ROBOTS: Final = 2
@@ -42,7 +42,7 @@ auto_resume = {resumes}
 
 [world]
 mode = "{mode}"
-seconds = {seconds}
+duration = {seconds}
 
 [identification]
 seconds = 60.0

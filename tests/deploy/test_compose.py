@@ -16,7 +16,7 @@ from quadriga.commands.parser import build_parser
 from quadriga.shared.config.endpoints import host_and_port, is_tls
 from quadriga.shared.config.load import load
 from quadriga.shared.members import DOCTOR, ESTOP, LAST, OBSERVER, RESET, RESUME, ROUTER, STOP
-from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.security.access import team_identities
 from quadriga.team.launch import ProcessSpec, process_table
 

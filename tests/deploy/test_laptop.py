@@ -33,7 +33,7 @@ def unit() -> configparser.ConfigParser:
 
 def test_the_configuration_is_one_laptop_for_each_robot() -> None:
     config = load(LAPTOP / "team.toml")
-    assert (config.bus.mode, config.team.plants) == ("client", "each")
+    assert (config.bus.mode, config.team.plant_per_robot) == ("client", True)
     assert members(config) >= {"r1", "r2", "plant_r1", "plant_r2"}
 
 

@@ -20,6 +20,7 @@ from quadriga.drive.gamepad import EVENT_BYTES, Gamepad, take, wish_of
 from quadriga.drive.wish import standing
 from quadriga.plant.commands import CommandBox
 from quadriga.recordings.echo import format_entry
+from quadriga.shared.about import QUESTIONS, About
 from quadriga.shared.bus.diagnostics import (
     MemberAnswer,
     TeamNorm,
@@ -29,15 +30,14 @@ from quadriga.shared.bus.diagnostics import (
 )
 from quadriga.shared.bus.discovery import read_about
 from quadriga.shared.bus.process_info import describe_process
+from quadriga.shared.codec import decode, encode, envelope
 from quadriga.shared.config.load import load
 from quadriga.shared.errors import MessageError
 from quadriga.shared.members import SIM, team_members
+from quadriga.shared.messages import LiveFault
 from quadriga.shared.printable import printable_line
 from quadriga.shared.recording.reader import ChunkEntry
-from quadriga.shared.wire.about import QUESTIONS, About
-from quadriga.shared.wire.codec import decode, encode, envelope
-from quadriga.shared.wire.messages import LiveFault
-from quadriga.shared.wire.topics import TABLE
+from quadriga.shared.topics import TABLE
 from quadriga.sim_server.world.faults import KINDS as FAULT_KINDS
 from quadriga.sim_server.world.faults import build_components, parse_faults, with_time
 from quadriga.status.gather import StatusFold

@@ -13,6 +13,7 @@ from quadriga.recordings.info import format_survey
 from quadriga.recordings.metadata import build_metadata
 from quadriga.recordings.recover import format_recovery, recover
 from quadriga.recordings.survey import survey
+from quadriga.shared.codec import encode
 from quadriga.shared.config.load import load
 from quadriga.shared.errors import QuadrigaError
 from quadriga.shared.printable import printable_line
@@ -20,8 +21,7 @@ from quadriga.shared.recording.metadata import PROFILE, seal
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.recording.recover import DamagedRecording
 from quadriga.shared.recording.writer import McapFile, RecordingWriter
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.topics import TABLE
+from quadriga.shared.topics import TABLE
 from tests.fuzz.arrays import SMALL
 from tests.fuzz.damage import damage
 from tests.fuzz.target import example

@@ -9,7 +9,7 @@ from typing import Any, Final, Protocol
 
 import numpy as np
 
-from quadriga.shared.wire.messages import Message
+from quadriga.shared.messages import Message
 from tests.fuzz.damage import damage
 
 VALUES: Final = (

@@ -35,17 +35,17 @@ from quadriga.replay.world_replay import read_asked_faults, read_computable_conf
 from quadriga.report import about
 from quadriga.report.run import build_run
 from quadriga.report.troubles import find_troubles
+from quadriga.shared.codec import MAX_INTEGER, MAX_TICK, encode
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import QuadrigaError
+from quadriga.shared.messages import Message
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.metadata import PROFILE, seal
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.recording.writer import McapFile
-from quadriga.shared.robot.conventions import robot_names
-from quadriga.shared.wire.codec import MAX_INTEGER, MAX_TICK, encode
-from quadriga.shared.wire.messages import Message
-from quadriga.shared.wire.topics import TABLE
+from quadriga.shared.robots.conventions import robot_names
+from quadriga.shared.topics import TABLE
 from quadriga.view.recorded import RecordedRun
 from tests.fuzz.damage import damage
 from tests.fuzz.target import example
@@ -91,7 +91,7 @@ class Walks:
     def __init__(
         self, folder: Path, changes: Mapping[str, Any], read: Callable[[Recording], object]
     ) -> None:
-        keys = {"team.robots": 2, "planner.kind": "none", "world.seconds": 1.0, **changes}
+        keys = {"team.robots": 2, "planner.kind": "none", "world.duration": 1.0, **changes}
         config = load(None, keys)
         self._path, self._read = folder / "walk.mcap", read
         self._metadata = build_metadata(config, "")

@@ -10,9 +10,9 @@ from itertools import zip_longest
 import numpy as np
 
 from quadriga.replay.difference import Difference, find_difference
-from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.messages import Message
-from quadriga.shared.wire.topics import topic_of
+from quadriga.shared.codec import decode
+from quadriga.shared.messages import Message
+from quadriga.shared.topics import topic_of
 
 TOLERANCE = 1e-6  # of a field's largest magnitude in the recording, for arrays
 

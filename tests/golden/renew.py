@@ -26,18 +26,18 @@ from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.predictor.store import predictor_sha256, save
 from quadriga.identification.predictors import ensure_predictor
 from quadriga.recordings.metadata import build_metadata
+from quadriga.shared.codec import encode
 from quadriga.shared.config.load import load as load_config
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError, QuadrigaError, RecordingError
 from quadriga.shared.recording.metadata import PROFILE
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.conventions import Array, robot_names
+from quadriga.shared.robots.conventions import Array, robot_names
 from quadriga.shared.runtime.arithmetic import arithmetic
 from quadriga.shared.runtime.atomic import atomic_write
 from quadriga.shared.runtime.clock import wall_ns
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.schema import json_schema
-from quadriga.shared.wire.topics import topic_of
+from quadriga.shared.schema import json_schema
+from quadriga.shared.topics import topic_of
 from tests.golden import scenario
 from tests.golden.compare import first_difference
 from tests.golden.rerun import recorded, rerun

@@ -8,11 +8,11 @@ from itertools import groupby
 from quadriga.agents.agent import Agent
 from quadriga.agents.inbox.inbox import Inbox
 from quadriga.agents.predictor.predictor import Predictor
+from quadriga.shared.codec import encode
 from quadriga.shared.config.sections import Config
 from quadriga.shared.recording.reader import ChunkEntry
 from quadriga.shared.runtime.blas import use_one_blas_thread
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.topics import COMMAND, MEASUREMENT, PLAN
+from quadriga.shared.topics import COMMAND, MEASUREMENT, PLAN
 
 OUTPUTS = (COMMAND, MEASUREMENT, PLAN)
 

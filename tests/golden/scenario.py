@@ -11,12 +11,12 @@ import numpy as np
 
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.identification.rollout import Rollout
+from quadriga.shared.codec import decode, encode
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import robot_names
-from quadriga.shared.wire.codec import decode, encode
-from quadriga.shared.wire.messages import Message, State
-from quadriga.shared.wire.topics import (
+from quadriga.shared.messages import Message, State
+from quadriga.shared.robots.conventions import robot_names
+from quadriga.shared.topics import (
     COMMAND,
     EVENT,
     MEASUREMENT,
@@ -37,7 +37,7 @@ REASONS: Final = FOLDER / "REASONS.md"
 # a short stand, so that most of the agent has something to do all the same. So little data need not
 # tell what robots do to each other.
 KEYS: Final = {
-    "team.robots": 2, "world.seed": 5, "world.seconds": 0.6, "world.push": "r2:150:90:0.3:0.1",
+    "team.robots": 2, "world.seed": 5, "world.duration": 0.6, "world.push": "r2:150:90:0.3:0.1",
     "gait.stand_ms": 100, "reference.vx": 0.4, "reference.wz": 0.3, "reference.ramp": 0.2,
     "planner.N": 8, "planner.T_ini": 4, "identification.block_weight": 20.0,
     "identification.max_peers_harm": 1000.0, "identification.predictor": "ridge",
@@ -70,11 +70,11 @@ def walk(config: Config, predictor: Predictor) -> Iterator[Sent]:
     team, names = config.team.name, robot_names(config.team.robots)
     asked = {
         tick: reference_at(config, tick)
-        for tick in range(0, round(1000 * config.world.seconds), REFERENCE_EPOCH_MS)
+        for tick in range(0, round(1000 * config.world.duration), REFERENCE_EPOCH_MS)
     }
     rollout = Rollout(config, predictor, asked.get)
     rollout.world = _CoarseWorld(config)
-    for tick in range(round(1000 * config.world.seconds)):
+    for tick in range(round(1000 * config.world.duration)):
         if tick in asked:
             yield REFERENCE.key(team), asked[tick]
         for name, state in rollout.world.states().items():

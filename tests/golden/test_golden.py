@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 
 from quadriga.agents.planner.acceptance import load_checked
+from quadriga.shared.codec import decode, encode
 from quadriga.shared.config.sections import Config
+from quadriga.shared.messages import Command, Message, State
 from quadriga.shared.recording.reader import ChunkEntry, Recording
 from quadriga.shared.runtime.arithmetic import arithmetic, differences
-from quadriga.shared.wire.codec import decode, encode
-from quadriga.shared.wire.messages import Command, Message, State
 from tests.golden import scenario
 from tests.golden.compare import TOLERANCE, first_difference
 from tests.golden.renew import ARITHMETIC, note, write

@@ -20,7 +20,7 @@ from quadriga.playback.timeline import parse_remap
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.runtime.places import SOURCE
 from quadriga.sim_server.world.faults import build_components, parse_faults, with_time
 from quadriga.stop_times.ways import WAYS

@@ -8,8 +8,8 @@ from typing import cast
 from quadriga.plant.attendance import note_absences
 from quadriga.plant.server import PlantServer
 from quadriga.plant.team_time import FollowerTime
+from quadriga.shared import codes
 from quadriga.shared.bus.session import Bus
-from quadriga.shared.wire import codes
 from quadriga.sim_server.world.world import World
 from tests.plant.test_server import Listener
 from tests.sim_server.standing import STAND, configured

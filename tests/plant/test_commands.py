@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from quadriga.plant.commands import CommandBox, command_limits
+from quadriga.shared.codec import MAX_TICK, encode
 from quadriga.shared.config.sections import TeamConfig
-from quadriga.shared.robot.a1 import A1
-from quadriga.shared.robot.robots import ROBOTS
-from quadriga.shared.robot.spec import RobotSpec
-from quadriga.shared.wire.codec import MAX_TICK, encode
-from quadriga.shared.wire.messages import Command, Event
+from quadriga.shared.messages import Command, Event
+from quadriga.shared.robots.a1 import A1
+from quadriga.shared.robots.registry import ROBOTS
+from quadriga.shared.robots.spec import RobotSpec
 from quadriga.sim_server.world.world import World
 from tests.sim_server.standing import configured
 

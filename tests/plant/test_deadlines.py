@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from quadriga.plant.deadlines import HELD, Deadlines
-from quadriga.shared.wire.codec import decode, encode
-from quadriga.shared.wire.messages import Status
+from quadriga.shared.codec import decode, encode
+from quadriga.shared.messages import Status
 
 
 def test_ages_of_commands_and_lateness_of_the_world_are_told() -> None:

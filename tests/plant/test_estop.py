@@ -11,10 +11,10 @@ from quadriga.plant.late import MOTOR_DAMPING
 from quadriga.plant.server import STOP_LINGER_MS, PlantServer
 from quadriga.plant.team_time import FollowerTime
 from quadriga.plant.words import NO_WORDS, Words
+from quadriga.shared import codes
 from quadriga.shared.bus.session import Bus
 from quadriga.shared.config.sections import Config
-from quadriga.shared.wire import codes
-from quadriga.shared.wire.messages import Reset, SafeStop
+from quadriga.shared.messages import Reset, SafeStop
 from quadriga.sim_server.world.world import World
 from tests.plant.test_server import Listener, served
 from tests.sim_server.standing import STAND
@@ -27,7 +27,7 @@ def say(server: PlantServer, *words: Words) -> None:
 
 
 def test_whatever_agents_command_after_it_the_joints_are_damped() -> None:
-    server, listener = served(spawn="standing")
+    server, listener = served(initial_posture="standing")
     for _ in range(50):
         server.step({"r1": STAND})
     say(server, Words("operator: dog"))
@@ -65,7 +65,7 @@ RELEASE = Reset(0, 0, "ann")
 
 
 def test_only_its_release_ends_it_and_not_one_of_the_same_tick() -> None:
-    server, listener = served(spawn="standing")
+    server, listener = served(initial_posture="standing")
     torques = []
     later = Words(reset=Reset(2, 0, "ann"))
     say(server, Words("dog", reset=RELEASE), NO_WORDS, later)
@@ -80,7 +80,7 @@ def test_only_its_release_ends_it_and_not_one_of_the_same_tick() -> None:
 
 
 def test_a_release_that_comes_twice_ends_no_stop_that_was_pressed_meanwhile() -> None:
-    server, listener = served(spawn="standing")
+    server, listener = served(initial_posture="standing")
     release = Words(reset=RELEASE)
     say(server, Words("dog"), release, Words("cat"), release, Words(reset=Reset(9, 0, "bob")))
     for _ in range(5):
@@ -90,7 +90,7 @@ def test_a_release_that_comes_twice_ends_no_stop_that_was_pressed_meanwhile() ->
 
 
 def test_a_release_that_was_said_before_a_stop_does_not_end_it() -> None:
-    server, listener = served(spawn="standing")
+    server, listener = served(initial_posture="standing")
     say(server, NO_WORDS, Words("dog"), Words(reset=RELEASE), Words(reset=Reset(1, 0, "ann")))
     for _ in range(4):
         server.step({"r1": STAND})
@@ -99,7 +99,7 @@ def test_a_release_that_was_said_before_a_stop_does_not_end_it() -> None:
 
 
 def test_whoever_presses_it_again_gets_an_answer_though_not_with_every_tick() -> None:
-    server, listener = served(spawn="standing")
+    server, listener = served(initial_posture="standing")
     server.words = lambda: Words("dog")
     for _ in range(250):
         server.step({"r1": STAND})
@@ -108,7 +108,7 @@ def test_whoever_presses_it_again_gets_an_answer_though_not_with_every_tick() ->
 
 
 def test_a_stopped_robot_sinks_and_that_is_no_fall_but_one_after_its_release_is() -> None:
-    server, listener = served(spawn="standing", seconds=60.0)
+    server, listener = served(initial_posture="standing", seconds=60.0)
     say(server, Words("dog"))
     for _ in range(2000):
         assert server.step({"r1": STAND}) is None
@@ -128,7 +128,7 @@ def test_a_stopped_robot_sinks_and_that_is_no_fall_but_one_after_its_release_is(
 
 @pytest.mark.parametrize("ends", [False, True])
 def test_a_walk_that_is_to_be_over_is_once_the_team_has_had_time_to_stand(ends: bool) -> None:
-    server, listener = served(spawn="standing")
+    server, listener = served(initial_posture="standing")
     say(server, NO_WORDS, Words(stop=SafeStop(0, 0, "lunch", ends)))
     over = [server.step({"r1": STAND}) for _ in range(STOP_LINGER_MS + 2)]
     asked = [(e.tick, e.detail) for e in listener.events() if e.code == codes.STOP_ASKED]

@@ -24,7 +24,7 @@ from quadriga.plant.late import (
 from quadriga.plant.realtime import _Motors
 from quadriga.plant.server import PlantServer
 from quadriga.shared.config.sections import Config, TeamConfig
-from quadriga.shared.robot.a1 import A1
+from quadriga.shared.robots.a1 import A1
 from quadriga.sim_server.world.world import World
 
 

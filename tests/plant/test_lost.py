@@ -11,7 +11,7 @@ import pytest
 from quadriga.identification.rollout import Rollout
 from quadriga.plant.lost import LostCommands
 from quadriga.shared.config.load import load
-from quadriga.shared.wire.messages import Command
+from quadriga.shared.messages import Command
 from quadriga.sim_server.world.world import World
 from quadriga.team.operator import references_of
 from tests.sim_server.standing import STAND, configured, stand
@@ -68,7 +68,7 @@ def test_who_has_commands_again_follows_them_and_may_fall(terrain: str) -> None:
     assert world.fallen() == ("r1",)
 
 
-BRIDGED = {"team.plant": "robots", "team.plants": "each", "world.mode": "realtime"}
+BRIDGED = {"team.plant": "robots", "team.plant_per_robot": True, "world.mode": "realtime"}
 
 
 @pytest.mark.parametrize("given", [{"world.lost_command": "damp"}, BRIDGED], ids=["damp", "robots"])
@@ -85,7 +85,7 @@ def test_only_simulated_robots_and_only_if_configured(given: dict[str, str]) -> 
 @pytest.mark.parametrize("at", range(1500, 1900, 50))
 def test_out_of_a_trot_it_comes_down_upright_at_any_phase(at: int) -> None:
     config = load(None, {"team.robots": 1, "planner.kind": "none"})
-    config = replace(config, world=replace(config.world, seconds=10.0))
+    config = replace(config, world=replace(config.world, duration=10.0))
     rollout, lost = Rollout(config, None, references_of(config)), LostCommands(config)
     for _ in rollout.ticks(at):
         pass

@@ -14,6 +14,7 @@ import pytest
 
 from quadriga.plant import pace as module
 from quadriga.plant.pace import SystemClock, TeamPace
+from quadriga.shared import codes
 from quadriga.shared.bus.diagnostics import ClockOffset, MemberAnswer
 from quadriga.shared.bus.discovery import join
 from quadriga.shared.bus.membership import members
@@ -22,9 +23,8 @@ from quadriga.shared.bus.session import READY, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError
+from quadriga.shared.messages import Status
 from quadriga.shared.runtime.clock import monotonic_ns, sleep, wall_offset
-from quadriga.shared.wire import codes
-from quadriga.shared.wire.messages import Status
 from quadriga.team.endpoint import free_endpoint
 from tests.shared.bus.abouts import SIM, answer
 
@@ -66,7 +66,7 @@ def config() -> Config:
     keys = {
         "team.robots": 2,
         "team.yokes": "none",
-        "team.plants": "each",
+        "team.plant_per_robot": True,
         "world.mode": "realtime",
         "planner.kind": "none",
         "recorder.enabled": False,

@@ -12,13 +12,13 @@ import pytest
 from quadriga.plant.process import _check_end
 from quadriga.plant.protocol import Plant
 from quadriga.plant.server import FALL_LINGER_MS, PlantServer
+from quadriga.shared import codes
 from quadriga.shared.bus.session import Bus
 from quadriga.shared.bus.standstill import Standstill
+from quadriga.shared.codec import MAX_TEXT, decode, encode
 from quadriga.shared.errors import ProcessError
-from quadriga.shared.wire import codes
-from quadriga.shared.wire.codec import MAX_TEXT, decode, encode
-from quadriga.shared.wire.messages import Clock, Command, Event, State
-from quadriga.shared.wire.topics import CLOCK, COMMAND, EVENT, POSTURE, STATE, TRUTH
+from quadriga.shared.messages import Clock, Command, Event, State
+from quadriga.shared.topics import CLOCK, COMMAND, EVENT, POSTURE, STATE, TRUTH
 from quadriga.sim_server.world.world import World
 from tests.sim_server.standing import configured
 
@@ -133,7 +133,7 @@ def test_any_plant_is_served(down: str, last: int) -> None:
     assert {key for key, _, _ in listener.packets} <= ours
     clock = [decode(p, Clock).tick for key, _, p in listener.packets if key == CLOCK.key("team")]
     assert clock == list(range(0, server.plant.tick, 10))
-    fallen, over = (codes.FALLEN, "fall of r1"), (codes.TIME_OVER, "end of world.seconds")
+    fallen, over = (codes.FALLEN, "fall of r1"), (codes.TIME_OVER, "end of world.duration")
     assert end == (fallen if down else over)
     assert server.plant.tick == last
 

@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 
 from quadriga.plant.team_time import FollowerTime, LeadTime, TeamTime, team_time
+from quadriga.shared import codes
+from quadriga.shared.codec import encode
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import N_JOINTS
-from quadriga.shared.wire import codes
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.messages import Clock, Command, Event, State
-from quadriga.shared.wire.topics import CLOCK, COMMAND, EVENT, STATE
+from quadriga.shared.messages import Clock, Command, Event, State
+from quadriga.shared.robots.conventions import N_JOINTS
+from quadriga.shared.topics import CLOCK, COMMAND, EVENT, STATE
 
 
 @pytest.fixture
 def config() -> Config:
-    return load(None, {"team.robots": 3, "team.yokes": "none", "team.plants": "each"})
+    return load(None, {"team.robots": 3, "team.yokes": "none", "team.plant_per_robot": True})
 
 
 def state(tick: int) -> bytes:
@@ -103,7 +103,7 @@ def test_followers_leave_by_the_same_event_as_all_others(config: Config) -> None
 
 @pytest.mark.parametrize("robot", ["r1", "r2"])
 def test_in_real_time_a_plant_is_silent_whose_newest_message_is_too_old(robot: str) -> None:
-    keys = {"team.robots": 2, "team.yokes": "none", "team.plants": "each"}
+    keys = {"team.robots": 2, "team.yokes": "none", "team.plant_per_robot": True}
     time = team_time(load(None, {**keys, "world.mode": "realtime"}), robot)
     other, topic, said = (
         ("plant_r2", STATE.key("team", "r2"), state)
@@ -136,7 +136,7 @@ def test_a_plant_ends_when_one_that_it_depends_on_is_gone(config: Config) -> Non
 
 
 def test_in_real_time_the_last_words_of_who_drives_time_may_come_after_it_left() -> None:
-    keys = {"team.robots": 2, "team.yokes": "none", "team.plants": "each"}
+    keys = {"team.robots": 2, "team.yokes": "none", "team.plant_per_robot": True}
     config = load(None, {**keys, "world.mode": "realtime"})
     for heard, code in ((True, codes.TIME_OVER), (False, codes.PLANT_GONE)):
         time = FollowerTime(config)

@@ -6,12 +6,12 @@ import pytest
 
 from quadriga.plant.words import NO_WORDS, Words, listen_to_words
 from quadriga.shared.bus.session import HERE, Bus
+from quadriga.shared.codec import encode
 from quadriga.shared.config.load import load
 from quadriga.shared.members import SIM
+from quadriga.shared.messages import EStop, LiveFault, Message, Reset, SafeStop
 from quadriga.shared.runtime.clock import monotonic, sleep
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.messages import EStop, LiveFault, Message, Reset, SafeStop
-from quadriga.shared.wire.topics import ESTOP, LIVE_FAULT, RESET, STOP, Topic
+from quadriga.shared.topics import ESTOP, LIVE_FAULT, RESET, STOP, Topic
 from quadriga.team.endpoint import free_endpoint
 
 FIRST, LAST = Reset(1, 0, "ann"), Reset(2, 0, "bob")

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from quadriga.shared.wire.messages import Plan
+from quadriga.shared.messages import Plan
 
 TOP = Path(__file__).parents[2]
 PACKAGE = "tests/plugins/balance"

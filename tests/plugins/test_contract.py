@@ -28,13 +28,13 @@ from quadriga.experiments.trial.sample_trials import sample_predictor
 from quadriga.identification.central_planner import choose_central_planner
 from quadriga.identification.rollout import Rollout
 from quadriga.identification.sample_fits import linear_episode
+from quadriga.shared.codec import decode, encode
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import PLANNER
+from quadriga.shared.messages import Plan
 from quadriga.shared.planner_kinds import find_kind, installed_kinds
-from quadriga.shared.robot.conventions import Array, robot_names
-from quadriga.shared.wire.codec import decode, encode
-from quadriga.shared.wire.messages import Plan
+from quadriga.shared.robots.conventions import Array, robot_names
 from quadriga.team.operator import references_of
 from tests.plugins.kinds import install_kind
 

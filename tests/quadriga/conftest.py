@@ -12,11 +12,11 @@ import pytest
 
 from quadriga.agents.gait import scheduled_stance
 from quadriga.recordings.metadata import build_metadata
+from quadriga.shared import messages as msg
+from quadriga.shared.codec import encode
 from quadriga.shared.config.sections import Config, ReferenceConfig, TeamConfig, WorldConfig
 from quadriga.shared.recording.writer import RecordingWriter
-from quadriga.shared.robot.conventions import robot_names
-from quadriga.shared.wire import messages as msg
-from quadriga.shared.wire.codec import encode
+from quadriga.shared.robots.conventions import robot_names
 from quadriga.sim_server.world.team_model import formation
 from tests.a1 import nominal_forces, q_stand
 
@@ -118,7 +118,7 @@ def agent_messages(config: Config, index: int, tick: int) -> Iterator[Packet]:
 def packets(config: Config, yaw: float) -> Iterator[Packet]:
     """All traffic of the run, in the order of a lock-step world."""
     zero, upright = np.zeros(12), np.array([1.0, 0.0, 0.0, 0.0])
-    n, last = config.team.robots, round(1000 * config.world.seconds)
+    n, last = config.team.robots, round(1000 * config.world.duration)
     for tick in range(last + 1):
         head = (tick, tick * 1_000_000)
         if tick % 100 == 0:
@@ -178,6 +178,6 @@ def run_config(robots: int = 2, seconds: float = SECONDS) -> Config:
     """A short walk straight on."""
     return Config(
         team=TeamConfig(robots=robots),
-        world=WorldConfig(seconds=seconds, seed=7),
+        world=WorldConfig(duration=seconds, seed=7),
         reference=ReferenceConfig(vx=0.5, ramp=1.0),
     )

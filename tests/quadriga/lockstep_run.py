@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 
 from quadriga.recordings.metadata import build_metadata
+from quadriga.shared import codes
+from quadriga.shared.codec import encode
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
+from quadriga.shared.messages import Command, Event
 from quadriga.shared.recording.writer import RecordingWriter
-from quadriga.shared.wire import codes
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.messages import Command, Event
 from quadriga.sim_server.world.world import World
 from tests.a1 import q_stand
 
@@ -26,7 +26,7 @@ SILENT = range(120, 180)  # ticks without r2's command; the world gave up on it
 LATE = range(120, 140)  # of these, ticks for which its command was sent too late
 SCENE = {
     "team.robots": 2, "world.terrain": "boxes", "world.terrain_height": 0.03, "world.seed": 5,
-    "world.payload": 3.0, "world.push": "r1:60:90:0.1:0.05", "world.seconds": 0.5,
+    "world.payload": 3.0, "world.push": "r1:60:90:0.1:0.05", "world.duration": 0.5,
     "world.lost_command": "damp",
 }  # fmt: skip
 

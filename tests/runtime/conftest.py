@@ -19,9 +19,9 @@ from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic, sleep
-from quadriga.shared.wire.topic import Topic
+from quadriga.shared.topic import Topic
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import Launch, ProcessSpec, process_table
 from quadriga.warm_up import warm_up
@@ -111,7 +111,7 @@ def make_team(tmp_path: Path, request: pytest.FixtureRequest) -> Make:
             "bus.barrier_timeout": WAIT,
             "bus.clock_timeout": 5.0,  # a machine that runs other tests stalls
             "recorder.enabled": False,
-            "runtime.refuse_overload": False,  # robots that walk late will do
+            "runtime.check_cpu": False,  # robots that walk late will do
         }
         keys = {"world.mode": "lockstep"} | {n.replace("__", "."): v for n, v in keys.items()}
         if keys["world.mode"] == REAL_TIME:

@@ -1,6 +1,6 @@
 """Controllers that stand for 100 ms and then fail, each robot's in its own way.
 
-Run by `team.controller`: python tests/runtime/faulty_controller.py r1=nan r2=ticks r3=silent …
+Run by `team.agent_command`: python tests/runtime/faulty_controller.py r1=nan r2=ticks r3=silent …
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ from typing import Final
 import numpy as np
 
 from quadriga.shared.bus.session import HERE, POLL, READY, Bus
+from quadriga.shared.codec import decode, encode
 from quadriga.shared.config.load import load
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.messages import Command, Event, State
+from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.runtime.signals import stop_on_signals
-from quadriga.shared.wire.codec import decode, encode
-from quadriga.shared.wire.messages import Command, Event, State
-from quadriga.shared.wire.topics import COMMAND, EVENT, STATE
+from quadriga.shared.topics import COMMAND, EVENT, STATE
 
 WELL: Final = 100  # ms
 SLOW: Final = 2e-3  # s, for an answer

@@ -10,11 +10,11 @@ from typing import Final
 import pytest
 
 from quadriga.shared.bus.session import Bus
+from quadriga.shared.codec import decode
+from quadriga.shared.codes import SILENT
+from quadriga.shared.messages import Command, Event, Truth
 from quadriga.shared.runtime.clock import monotonic
-from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.codes import SILENT
-from quadriga.shared.wire.messages import Command, Event, Truth
-from quadriga.shared.wire.topics import COMMAND, EVENT, TRUTH
+from quadriga.shared.topics import COMMAND, EVENT, TRUTH
 from quadriga.team.launch import Launch
 from tests.runtime.conftest import WAIT
 

@@ -12,16 +12,16 @@ import numpy as np
 
 from quadriga.shared.bus.discovery import join
 from quadriga.shared.bus.session import HERE, POLL, READY, Bus
+from quadriga.shared.codec import decode, encode
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
 from quadriga.shared.members import has_lead
-from quadriga.shared.robot.conventions import N_JOINTS
+from quadriga.shared.messages import Command, Event, State
+from quadriga.shared.robots.conventions import N_JOINTS
 from quadriga.shared.runtime.scheduling import take_priority
 from quadriga.shared.runtime.signals import die_with_parent, stop_on_signals
-from quadriga.shared.wire.codec import decode, encode
-from quadriga.shared.wire.messages import Command, Event, State
-from quadriga.shared.wire.topics import COMMAND, EVENT, STATE
+from quadriga.shared.topics import COMMAND, EVENT, STATE
 from tests.a1 import q_stand
 
 

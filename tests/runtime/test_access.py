@@ -16,7 +16,7 @@ from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.errors import BusError, ConfigError
 from quadriga.shared.security.access import largest
 from quadriga.shared.security.certificates import TlsFiles, tls_files
-from quadriga.shared.wire.topics import COMMAND
+from quadriga.shared.topics import COMMAND
 from tests.runtime.conftest import Make, Team
 from tests.runtime.fortress import LONG_AGO, NOW, WAIT, Fortress, make_fortress, serving, stranger
 from tests.runtime.test_lockstep import payloads
@@ -67,7 +67,7 @@ def heard(fortress: Fortress, recorder: Bus, session: zenoh.Session | None = Non
 
 
 def test_the_same_walk_as_without_a_router(make_team: Make, tmp_path: Path) -> None:
-    direct = make_team(recorder__enabled=True, world__seconds=0.5)
+    direct = make_team(recorder__enabled=True, world__duration=0.5)
     expected = payloads(direct.run())
     folder = tmp_path / "secure"
     folder.mkdir()

@@ -12,7 +12,7 @@ from quadriga.commands.parser import main
 WAYS = ("silence", "page", "keyboard", "estop", "armed", "gamepad")
 OPTIONS = (
     *("--robots", "1", "--planner", "none", "--tries", "1"),
-    *("--set", "runtime.refuse_overload=false"),
+    *("--set", "runtime.check_cpu=false"),
 )
 
 

@@ -15,14 +15,14 @@ import pytest
 
 from quadriga.shared import members
 from quadriga.shared.bus.session import HERE, Bus
+from quadriga.shared.codec import encode
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
+from quadriga.shared.messages import EStop, Event, Measurement
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.runtime.clock import monotonic, sleep
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.messages import EStop, Event, Measurement
-from quadriga.shared.wire.topics import ESTOP
+from quadriga.shared.topics import ESTOP
 from quadriga.team.endpoint import free_endpoint
 from tests.bridges.test_udp_driver import HOST, free_port
 from tests.runtime.conftest import WAIT
@@ -52,9 +52,9 @@ def config(request: pytest.FixtureRequest) -> Config:
             "team.robot": request.param,
             "team.robots": 1,
             "team.plant": "robots",
-            "team.plants": "each",
+            "team.plant_per_robot": True,
             "world.mode": "realtime",
-            "world.seconds": 2.0,
+            "world.duration": 2.0,
             "planner.kind": "none",
             "bus.endpoint": free_endpoint(),
             "bridge.endpoint": f"{HOST}:{free_port()}",

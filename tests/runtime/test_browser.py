@@ -11,11 +11,11 @@ from quadriga.drive.driver_words import WHERE
 from quadriga.drive.find import open_link
 from quadriga.recordings.traces import read_traces
 from quadriga.shared.bus.session import Bus
+from quadriga.shared.codec import decode
+from quadriga.shared.codes import FALL
+from quadriga.shared.messages import Reference, Status
 from quadriga.shared.runtime.clock import monotonic
-from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.codes import FALL
-from quadriga.shared.wire.messages import Reference, Status
-from quadriga.shared.wire.topics import REFERENCE, STATUS
+from quadriga.shared.topics import REFERENCE, STATUS
 from quadriga.team.launch import Launch
 from tests.browser import CHROMIUM, WHY_NOT, Browser, Page, browser
 from tests.runtime.conftest import WAIT, Make, Team
@@ -112,7 +112,7 @@ def test_a_team_is_driven_stopped_and_released_from_a_page(
         team__robots=1,
         reference__driver="hand",
         world__mode="realtime",
-        world__seconds=600.0,
+        world__duration=600.0,
         recorder__enabled=True,
     )
     with team.launch(standing=False) as running:

@@ -28,8 +28,8 @@ def assert_checked(team: Team) -> None:
 def test_a_function_walks_and_is_judged_and_not_recomputed(make_team: Make) -> None:
     team = make_team(
         team__robots=1,
-        team__controller=f"python {TROT}",
-        world__seconds=2.0,
+        team__agent_command=f"python {TROT}",
+        world__duration=2.0,
         gait__stand_ms=300,
         reference__ramp=0.3,
         recorder__enabled=True,
@@ -54,8 +54,8 @@ def test_a_program_without_quadriga_is_one_of_the_team(make_team: Make) -> None:
     assert not re.search(r"^\s*(import|from) quadriga", BARE.read_text(), re.MULTILINE)
     team = make_team(
         team__robots=2,
-        team__controller=f"python {BARE}",
-        world__seconds=0.6,
+        team__agent_command=f"python {BARE}",
+        world__duration=0.6,
         recorder__enabled=True,
     )
     recording = team.run(standing=False)
@@ -69,8 +69,8 @@ def test_who_fails_is_named_and_the_world_goes_on(make_team: Make) -> None:
     team = make_team(
         team__robots=4,
         team__yokes="none",
-        team__controller=f"python {FAULTY} {ways}",
-        world__seconds=0.5,
+        team__agent_command=f"python {FAULTY} {ways}",
+        world__duration=0.5,
         world__command_timeout=0.5,
         recorder__enabled=True,
     )

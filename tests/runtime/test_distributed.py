@@ -18,9 +18,9 @@ from quadriga.identification.predictors import ensure_predictor
 from quadriga.replay.team_replay import replay
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
+from quadriga.shared.messages import Plan
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.conventions import robot_names
-from quadriga.shared.wire.messages import Plan
+from quadriga.shared.robots.conventions import robot_names
 from quadriga.team.launch import Launch, process_table
 from tests.a1 import nominal_forces
 from tests.runtime.conftest import DATA

@@ -14,15 +14,15 @@ from typing import Any
 
 import pytest
 
+from quadriga.shared.about import ABOUT, About
 from quadriga.shared.bus.process_info import ProcessInfo, describe_process
 from quadriga.shared.bus.session import HERE, Bus
+from quadriga.shared.codec import decode, encode
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.runtime.clock import monotonic
-from quadriga.shared.wire.about import ABOUT, About
-from quadriga.shared.wire.codec import decode, encode
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import QUADRIGA, Launch
 from tests.runtime.conftest import BEGUN, WAIT, Make, Team
@@ -145,7 +145,7 @@ def test_a_team_that_waits_for_one_and_a_doctor_that_is_none_of_it(
 
 
 def test_a_doctor_beside_a_walk_finds_all_well_and_leaves_it_alone(make_team: Make) -> None:
-    team = make_team(world__seconds=600.0)
+    team = make_team(world__duration=600.0)
     with team.launch() as running:
         team.await_log("sim", BEGUN)
         _, report = doctor(team.config, of=team)

@@ -15,10 +15,10 @@ from quadriga.recordings.check import check
 from quadriga.recordings.summary import summary_of
 from quadriga.recordings.traces import read_traces
 from quadriga.shared.bus.session import Bus
+from quadriga.shared.codes import LEAD_GONE, LINK_LOST
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.recording.metadata import END
-from quadriga.shared.wire.codes import LEAD_GONE, LINK_LOST
-from quadriga.shared.wire.topics import TRUTH
+from quadriga.shared.topics import TRUTH
 from quadriga.team.launch import Launch
 from quadriga.team.run_report import report_folder
 from tests.runtime.conftest import WAIT, Make, Team
@@ -54,7 +54,7 @@ def check_recording(team: Team, code: str, what: str, capsys: pytest.CaptureFixt
 def test_kill_9_of_who_drives_time(
     make_team: Make, watcher: Watcher, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    team = make_team(recorder__enabled=True, world__seconds=600.0)
+    team = make_team(recorder__enabled=True, world__duration=600.0)
     with team.launch(standing=False) as running:
         await_tick(watcher(team, TRUTH), 500)
         os.kill(running.pids["sim"], signal.SIGKILL)
@@ -71,7 +71,7 @@ def test_kill_9_of_the_router(
     make_team: Make, watcher: Watcher, capsys: pytest.CaptureFixture[str], mode: str
 ) -> None:
     keys = {"bus__mode": "client", "world__mode": mode, "bus__reconnect_timeout": 1.0}
-    team = make_team(recorder__enabled=True, world__seconds=600.0, **keys)
+    team = make_team(recorder__enabled=True, world__duration=600.0, **keys)
     with router(team) as process:
         await_routing(process)
         with team.launch(standing=False) as running:

@@ -12,12 +12,12 @@ import pytest
 
 from quadriga.recordings.summary import summarise
 from quadriga.shared.bus.session import Bus
+from quadriga.shared.codec import decode, encode
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.errors import ProcessError
+from quadriga.shared.messages import Clock, EStop, Event, Status
 from quadriga.shared.runtime.clock import monotonic, sleep
-from quadriga.shared.wire.codec import decode, encode
-from quadriga.shared.wire.messages import Clock, EStop, Event, Status
-from quadriga.shared.wire.topics import CLOCK, COMMAND, EVENT
+from quadriga.shared.topics import CLOCK, COMMAND, EVENT
 from quadriga.team import launch
 from tests.runtime.conftest import BEGUN, WAIT, Make, run_alone
 from tests.runtime.frozen import PATIENCE, TEAM, await_tick, freeze
@@ -33,7 +33,7 @@ def never() -> bool:
 def test_a_frozen_robot_is_named_and_the_world_goes_on_until_it_returns(
     make_team: Make, watcher: Watcher
 ) -> None:
-    team = make_team(world__seconds=FOREVER, world__command_timeout=PATIENCE)
+    team = make_team(world__duration=FOREVER, world__command_timeout=PATIENCE)
     with team.launch() as running:
         team.await_log("sim", BEGUN)
         freeze(running, watcher(team), "r2", tick=100, ticks=100)
@@ -43,7 +43,7 @@ def test_a_frozen_robot_is_named_and_the_world_goes_on_until_it_returns(
 
 
 def test_who_is_frozen_to_the_end_is_named_and_nobody_else(make_team: Make) -> None:
-    team = make_team(world__seconds=1.0, world__command_timeout=0.5)
+    team = make_team(world__duration=1.0, world__command_timeout=0.5)
     rows = [replace(row, grace=1.0 if row.name == "r2" else row.grace) for row in team.rows()]
     with launch.Launch(rows, team.folder / "logs") as running:
         team.await_log("sim", BEGUN)
@@ -51,7 +51,7 @@ def test_who_is_frozen_to_the_end_is_named_and_nobody_else(make_team: Make) -> N
         with pytest.raises(ProcessError, match="process r2: got no end after the walk"):
             running.watch(never)
     last = team.log("sim").splitlines()[-1]
-    assert "time-over  end of world.seconds" in last, "and then nothing, no traceback"
+    assert "time-over  end of world.duration" in last, "and then nothing, no traceback"
 
 
 def test_in_real_time_the_world_waits_for_no_frozen_listener(
@@ -59,7 +59,7 @@ def test_in_real_time_the_world_waits_for_no_frozen_listener(
 ) -> None:
     """Its buffers are full some seconds after it froze, and what must not be lost waits 5 s."""
     pushes = ",".join(f"r1:5:90:{second}:0.1" for second in range(1, 120))
-    team = make_team(world__mode="realtime", world__seconds=FOREVER, world__push=pushes)
+    team = make_team(world__mode="realtime", world__duration=FOREVER, world__push=pushes)
     echo = (*launch.QUADRIGA, "echo", "**", "--config", str(team.folder / "config.toml"))
     with team.launch() as running, subprocess.Popen(echo, stdout=subprocess.PIPE) as listener:
         try:
@@ -85,7 +85,7 @@ def test_in_real_time_the_world_waits_for_no_frozen_listener(
 
 @pytest.mark.parametrize("name", ["sim", "r2", "operator"])
 def test_kill_9_of_one_stops_the_walk_and_names_it(make_team: Make, name: str) -> None:
-    team = make_team(world__seconds=FOREVER)
+    team = make_team(world__duration=FOREVER)
     with team.launch() as running:
         pids = running.pids
         team.await_log("sim", BEGUN)
@@ -101,7 +101,7 @@ def test_kill_9_of_one_stops_the_walk_and_names_it(make_team: Make, name: str) -
 def test_a_stopped_sim_server_ends_the_walk_for_all(
     make_team: Make, number: signal.Signals
 ) -> None:
-    team = make_team(world__seconds=FOREVER)
+    team = make_team(world__duration=FOREVER)
     with team.launch() as running:
         team.await_log("sim", BEGUN)
         os.kill(running.pids["sim"], number)
@@ -117,7 +117,7 @@ def test_an_end_that_somebody_else_announces_ends_nothing(
 
     Nobody leaves while time goes on, and the operator goes on asking.
     """
-    team = make_team(world__seconds=4.0, gait__stand_ms=500, recorder__enabled=True)
+    team = make_team(world__duration=4.0, gait__stand_ms=500, recorder__enabled=True)
     with team.launch(standing=False) as running:
         bus = watcher(team, CLOCK)
         say = bus.publisher(EVENT.key("team"))
@@ -131,7 +131,7 @@ def test_an_end_that_somebody_else_announces_ends_nothing(
         running.watch(never)
     summary = summarise(team.folder)
     assert len(said) == 20
-    assert summary["end"].startswith("end of world.seconds")
+    assert summary["end"].startswith("end of world.duration")
     assert (summary["fallen"], summary["stop_reasons"], summary["gaps"]) == ([], {}, 0)
     ticks = [entry.tick for entry in team.recording().entries({COMMAND.name})]
     assert max(ticks) >= 3999
@@ -143,7 +143,7 @@ def test_a_stopped_agent_leaves_cleanly_and_the_walk_stops(
     make_team: Make, monkeypatch: pytest.MonkeyPatch, number: signal.Signals
 ) -> None:
     monkeypatch.setattr(launch, "_EARLY", 0.3)
-    team = make_team(team__robots=1, world__seconds=FOREVER)
+    team = make_team(team__robots=1, world__duration=FOREVER)
     with team.launch(standing=False) as running:
         team.await_log("sim", BEGUN)
         os.kill(running.pids["r1"], number)
@@ -156,7 +156,7 @@ def test_a_stopped_agent_leaves_cleanly_and_the_walk_stops(
 
 @pytest.mark.usefixtures("_compiled")
 def test_an_emergency_stop_damps_every_robot(make_team: Make, watcher: Watcher) -> None:
-    team = make_team(world__seconds=FOREVER)
+    team = make_team(world__duration=FOREVER)
     with team.launch(standing=False) as running:
         team.await_log("sim", BEGUN)
         bus = watcher(team)
@@ -192,7 +192,7 @@ def test_the_world_obeys_an_emergency_stop_whatever_the_agents_do(
     make_team: Make, mode: str
 ) -> None:
     """These stand on: they have never heard of an emergency stop."""
-    team = make_team(world__seconds=FOREVER, world__mode=mode)
+    team = make_team(world__duration=FOREVER, world__mode=mode)
     file = str(team.folder / "config.toml")
     with team.launch() as running:
         team.await_log("sim", BEGUN)
@@ -210,7 +210,7 @@ def test_the_world_obeys_an_emergency_stop_whatever_the_agents_do(
 @pytest.mark.usefixtures("_compiled")
 def test_an_emergency_stop_waits_for_nobody(make_team: Make, watcher: Watcher) -> None:
     """Also where it is meant for a robot that is not there, which then is named."""
-    team = make_team(world__seconds=FOREVER)
+    team = make_team(world__duration=FOREVER)
     larger = replace(team.config, team=replace(team.config.team, robots=3))
     file = team.folder / "larger.toml"
     file.write_text(to_toml(larger), encoding="utf-8")

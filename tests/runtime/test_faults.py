@@ -10,17 +10,17 @@ import pytest
 
 from quadriga.commands.parser import main
 from quadriga.recordings.check import check
+from quadriga.shared.codec import decode
+from quadriga.shared.codes import FAULT_BEGINS
+from quadriga.shared.messages import Event
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.codes import FAULT_BEGINS
-from quadriga.shared.wire.messages import Event
-from quadriga.shared.wire.topics import INJECTED
+from quadriga.shared.topics import INJECTED
 from tests.runtime.conftest import DATA
 
 EARLY = 37  # a world's seed with which things go wrong early in a walk
 ARGUMENTS = (
-    *("--set", "runtime.refuse_overload=false"),
-    *("--set", "world.seconds=8"),  # the doctor has time to look on a busy computer, too
+    *("--set", "runtime.check_cpu=false"),
+    *("--set", "world.duration=8"),  # the doctor has time to look on a busy computer, too
     *("--planner", "none", "--robots", "2", "--jobs", "2", "--set", f"world.seed={EARLY}"),
     *(word for name, value in DATA.items() for word in ("--set", f"{name}={value:g}")),
 )

@@ -14,18 +14,18 @@ import numpy as np
 import pytest
 
 from quadriga.shared.bus.session import READY, Bus
+from quadriga.shared.codec import M, decode, encode
 from quadriga.shared.errors import MessageError
+from quadriga.shared.messages import Command, Event, Reference, State, Status, Truth
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic
-from quadriga.shared.wire.codec import M, decode, encode
-from quadriga.shared.wire.messages import Command, Event, Reference, State, Status, Truth
-from quadriga.shared.wire.topics import ESTOP, EVENT, STATUS, TABLE, TRUTH
+from quadriga.shared.topics import ESTOP, EVENT, STATUS, TABLE, TRUTH
 from tests.runtime.conftest import BEGUN, WAIT, Make, Team, run_alone
 
 
 def test_every_tick_is_answered_and_recorded_and_everyone_leaves(make_team: Make) -> None:
-    team = make_team(recorder__enabled=True, world__seconds=1.0)
+    team = make_team(recorder__enabled=True, world__duration=1.0)
     recording = team.run()
     for robot in ("r1", "r2"):
         assert [m.tick for m in recording.messages(State, robot)] == list(range(1000))
@@ -34,11 +34,11 @@ def test_every_tick_is_answered_and_recorded_and_everyone_leaves(make_team: Make
     assert {m.tick for m in recording.messages(Reference)} >= set(range(0, 1300, 100))
     events = [(m.tick, m.kind, m.detail) for m in recording.messages(Event)]
     assert events[0][1] == "start"
-    assert events[-1] == (1000, "stop", "end of world.seconds")
+    assert events[-1] == (1000, "stop", "end of world.duration")
 
 
 def test_the_end_comes_a_second_after_a_fall(make_team: Make) -> None:
-    team = make_team(recorder__enabled=True, world__seconds=9.0, world__push="r1:2000:0:0.1:0.2")
+    team = make_team(recorder__enabled=True, world__duration=9.0, world__push="r1:2000:0:0.1:0.2")
     events = list(team.run().messages(Event))
     fall = next(m for m in events if m.kind == "fall")
     assert (events[-1].kind, events[-1].tick) == ("stop", fall.tick + 1000)
@@ -47,7 +47,7 @@ def test_the_end_comes_a_second_after_a_fall(make_team: Make) -> None:
 
 @pytest.mark.usefixtures("_compiled")
 def test_two_runs_of_one_scenario_give_the_same_bytes(make_team: Make) -> None:
-    team = make_team(recorder__enabled=True, world__seconds=0.8, estimator__kind="kalman")
+    team = make_team(recorder__enabled=True, world__duration=0.8, estimator__kind="kalman")
     digests = []
     for run in ("first", "second"):
         folder = team.folder / run
@@ -70,7 +70,7 @@ def payloads(recording: Recording) -> dict[str, str]:
 def test_malformed_messages_on_every_key_are_dropped_and_counted(
     make_team: Make, watcher: Callable[..., Bus]
 ) -> None:
-    team = make_team(recorder__enabled=True, world__seconds=600.0)
+    team = make_team(recorder__enabled=True, world__duration=600.0)
     with team.launch(standing=False) as running:
         bus = watcher(team)
         assert bus.wait_for(READY, {"sim"}, WAIT, lambda: False)
@@ -128,7 +128,7 @@ def inject_noise(bus: Bus, team: Team) -> None:
 
 
 def test_real_time_says_what_came_late(make_team: Make) -> None:
-    team = make_team(team__robots=1, world__mode="realtime", world__seconds=1.0)
+    team = make_team(team__robots=1, world__mode="realtime", world__duration=1.0)
     with team.launch() as running:
         running.watch(lambda: False)
     last = team.log("sim").splitlines()[-1]
@@ -137,7 +137,7 @@ def test_real_time_says_what_came_late(make_team: Make) -> None:
 
 
 def test_a_second_team_does_not_disturb_the_first(make_team: Make) -> None:
-    team = make_team(team__robots=1, recorder__enabled=True, world__seconds=600.0)
+    team = make_team(team__robots=1, recorder__enabled=True, world__duration=600.0)
     intruders = team.folder / "intruders"
     intruders.mkdir()
     second = Team(team.config, intruders)

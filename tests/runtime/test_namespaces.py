@@ -14,10 +14,10 @@ from quadriga.recordings.check import check
 from quadriga.shared.config.load import load
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.members import DOCTOR, LAST, ROUTER
+from quadriga.shared.messages import Command
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns
 from quadriga.shared.security.access import team_identities
-from quadriga.shared.wire.messages import Command
 from quadriga.team.launch import Launch, ProcessSpec
 from tests.deploy.test_compose import SERVICES, TEAM, resolve
 from tests.runtime.conftest import WAIT
@@ -57,7 +57,7 @@ def write_team(folder: Path, router: str) -> None:
         "bus.certificates": str(folder / "certs"),
         "bus.barrier_timeout": WAIT,
         "planner.kind": "none",
-        "world.seconds": SECONDS,
+        "world.duration": SECONDS,
     }
     config = load(TEAM, keys)
     (folder / "team.toml").write_text(to_toml(config), encoding="utf-8")

@@ -20,16 +20,16 @@ from quadriga.identification.predictors import ensure_predictor
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.bus.liveness import LAST_PACKETS
 from quadriga.shared.bus.session import Bus
+from quadriga.shared.codec import decode, encode
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
+from quadriga.shared.messages import Clock, Command, Event, Measurement, Plan
 from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.runtime.clock import sleep
-from quadriga.shared.wire.codec import decode, encode
-from quadriga.shared.wire.messages import Clock, Command, Event, Measurement, Plan
-from quadriga.shared.wire.topics import CLOCK, EVENT
+from quadriga.shared.topics import CLOCK, EVENT
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import Launch, process_table
 from quadriga.team.operator import reference_at
@@ -50,7 +50,7 @@ KINDS: dict[str, dict[str, object]] = {
 def config_of(kind: str) -> Config:
     given: dict[str, object] = {
         "team.robots": ROBOTS,
-        "world.seconds": SECONDS,
+        "world.duration": SECONDS,
         "world.seed": 4,
         "bus.endpoint": free_endpoint(),
         **DATA,
@@ -129,7 +129,7 @@ def await_tick(bus: Bus, tick: int) -> int:
 def test_a_central_planner_outlives_a_false_end_and_a_pause_after_it(tmp_path: Path) -> None:
     """Who believes in an end leaves as soon as the world has been silent for a while."""
     config = config_of("centralised")
-    config = replace(config, world=replace(config.world, seconds=3.0))
+    config = replace(config, world=replace(config.world, duration=3.0))
     predictor = ensure_predictor(config, Console(stderr=True))
     (tmp_path / "config.toml").write_text(to_toml(config), encoding="utf-8")
     with (

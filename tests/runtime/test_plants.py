@@ -17,28 +17,20 @@ from typing import Any
 import pytest
 
 from quadriga.shared.bus.session import Bus
+from quadriga.shared.codec import decode
 from quadriga.shared.errors import ProcessError
+from quadriga.shared.messages import Clock, Command, Event, Measurement, Reference, State, Truth
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.runtime.places import SOURCE
-from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.messages import (
-    Clock,
-    Command,
-    Event,
-    Measurement,
-    Reference,
-    State,
-    Truth,
-)
-from quadriga.shared.wire.topics import CLOCK
+from quadriga.shared.topics import CLOCK
 from quadriga.team import launch
 from quadriga.team.launch import Launch, ProcessSpec
 from tests.runtime.conftest import BEGUN, WAIT, Make, Team
 
 FOREVER = 600.0  # s of world time
 Watcher = Callable[..., Bus]
-EACH = {"team__plants": "each", "team__yokes": "none"}
+EACH = {"team__plant_per_robot": True, "team__yokes": "none"}
 LOCKSTEP, REALTIME = {"world__mode": "lockstep"}, {"world__mode": "realtime"}
 
 pytestmark = pytest.mark.usefixtures("_compiled")
@@ -88,7 +80,7 @@ def check_walked_to_the_end(recording: Recording, *, lockstep: bool) -> None:
 def test_a_plant_of_another_package_walks(
     puppets: Make, mode: dict[str, str], plants: dict[str, str]
 ) -> None:
-    team = puppets(recorder__enabled=True, world__seconds=1.0, **mode, **plants)
+    team = puppets(recorder__enabled=True, world__duration=1.0, **mode, **plants)
     recording = team.run(standing=False)
     check_walked_to_the_end(recording, lockstep=mode is LOCKSTEP)
     assert not list(recording.messages(Truth)), "nobody knows it"
@@ -96,7 +88,7 @@ def test_a_plant_of_another_package_walks(
 
 
 def test_robots_in_worlds_of_their_own_walk_and_every_walk_is_the_same(make_team: Make) -> None:
-    team = make_team(recorder__enabled=True, world__seconds=2.0, **EACH)
+    team = make_team(recorder__enabled=True, world__duration=2.0, **EACH)
     digests = []
     for run in ("first", "second"):
         folder = team.folder / run
@@ -131,7 +123,7 @@ def payloads(recording: Recording) -> dict[str, str]:
 
 def test_a_fall_in_one_world_ends_the_walk_of_all(make_team: Make) -> None:
     push = "r2:2000:0:0.1:0.2"
-    team = make_team(recorder__enabled=True, world__seconds=9.0, world__push=push, **EACH)
+    team = make_team(recorder__enabled=True, world__duration=9.0, world__push=push, **EACH)
     events = list(team.run().messages(Event))
     fall = next(e for e in events if e.kind == "fall")
     stop = next(e for e in events if e.kind == "stop")
@@ -146,7 +138,7 @@ def test_a_fall_in_one_world_ends_the_walk_of_all(make_team: Make) -> None:
 def test_a_plant_that_dies_stops_the_team_and_is_named(
     puppets: Make, watcher: Watcher, mode: dict[str, str], number: signal.Signals
 ) -> None:
-    team = puppets(world__seconds=FOREVER, **EACH, **mode)
+    team = puppets(world__duration=FOREVER, **EACH, **mode)
     with team.launch() as running:
         pids = running.pids
         await_clock(watcher(team), 100)
@@ -162,7 +154,7 @@ def test_a_plant_that_dies_stops_the_team_and_is_named(
 def test_the_others_leave_when_who_drives_time_dies(
     puppets: Make, watcher: Watcher, mode: dict[str, str]
 ) -> None:
-    team = puppets(world__seconds=FOREVER, **EACH, **mode)
+    team = puppets(world__duration=FOREVER, **EACH, **mode)
     with team.launch() as running:
         pids = running.pids
         await_clock(watcher(team), 100)
@@ -174,7 +166,7 @@ def test_the_others_leave_when_who_drives_time_dies(
 
 
 def test_a_frozen_plant_stops_the_team_and_is_named(make_team: Make) -> None:
-    team = make_team(world__seconds=FOREVER, world__command_timeout=0.5, **EACH)
+    team = make_team(world__duration=FOREVER, world__command_timeout=0.5, **EACH)
     with team.launch() as running:
         team.await_log("plant_r1", BEGUN)
         os.kill(running.pids["plant_r2"], signal.SIGSTOP)
@@ -189,7 +181,7 @@ def test_a_frozen_plant_is_missed_in_real_time_whoever_leads(
     puppets: Make, watcher: Watcher, frozen: int, other: int
 ) -> None:
     """Robots of the others lie down; an arm's length of silence is enough."""
-    team = puppets(world__seconds=FOREVER, bus__clock_timeout=2.0, **EACH, **REALTIME)
+    team = puppets(world__duration=FOREVER, bus__clock_timeout=2.0, **EACH, **REALTIME)
     with team.launch() as running:
         await_clock(watcher(team), 100)
         pid = running.pids[f"plant_r{frozen}"]
@@ -214,7 +206,7 @@ def test_a_frozen_plant_is_missed_in_real_time_whoever_leads(
 def test_a_plant_whose_system_clock_is_wrong_is_named(
     puppets: Make, watcher: Watcher, before: str, later: str, name: str, said: str
 ) -> None:
-    team = puppets(world__seconds=FOREVER, **EACH, **REALTIME)
+    team = puppets(world__duration=FOREVER, **EACH, **REALTIME)
     file = team.folder / "clock"
     file.write_text(before, encoding="ascii")
     rows = tuple(skewed(row, file) if row.name == "plant_r2" else row for row in team.rows())
@@ -235,17 +227,17 @@ def skewed(row: ProcessSpec, file: Path) -> ProcessSpec:
 def test_a_robot_that_leaves_is_led_down_by_its_own_plant_and_the_walk_goes_on(
     make_team: Make,
 ) -> None:
-    team = make_team(world__seconds=4.0, **EACH)
+    team = make_team(world__duration=4.0, **EACH)
     with team.launch() as running:
         team.await_log("plant_r1", BEGUN)
         os.kill(running.pids["r2"], signal.SIGKILL)
         team.await_log("plant_r2", "gone r2 gone: the world goes on")
         team.await_log("plant_r2", "lowered r2 no command: its joints are led down")
-        team.await_log("plant_r1", "time-over  end of world.seconds")
+        team.await_log("plant_r1", "time-over  end of world.duration")
 
 
 def test_a_walk_that_is_told_to_stop_leaves_no_plant_behind(make_team: Make) -> None:
-    team = make_team(world__seconds=FOREVER, **EACH)
+    team = make_team(world__duration=FOREVER, **EACH)
     team.rows(standing=False)
     file = str(team.folder / "config.toml")
     walk = (*launch.QUADRIGA, "walk", "--config", file, "--out", str(team.folder / "out"))

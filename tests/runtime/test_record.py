@@ -10,8 +10,8 @@ import sys
 from pathlib import Path
 
 from quadriga.recordings.survey import survey
+from quadriga.shared.messages import Event
 from quadriga.shared.runtime.clock import monotonic, sleep
-from quadriga.shared.wire.messages import Event
 from tests.runtime.conftest import BEGUN, WAIT, Make, Team
 
 
@@ -36,7 +36,7 @@ def beside(team: Team, name: str, room: int = -1) -> subprocess.Popen[str]:
 
 
 def test_recorders_die_beside_a_team_that_walks_on(make_team: Make) -> None:
-    team = make_team(team__robots=1, recorder__enabled=True, world__seconds=600.0)
+    team = make_team(team__robots=1, recorder__enabled=True, world__duration=600.0)
     late = team.folder / "late.mcap"
     others = []
     try:

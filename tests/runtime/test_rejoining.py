@@ -15,10 +15,8 @@ from quadriga.commands.parser import main
 from quadriga.recordings.check import check
 from quadriga.recordings.traces import read_traces
 from quadriga.shared.bus.session import Bus
-from quadriga.shared.recording.reader import Recording
-from quadriga.shared.runtime.clock import monotonic, sleep
-from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.codes import (
+from quadriga.shared.codec import decode
+from quadriga.shared.codes import (
     FALL,
     INPUT_LOST,
     LINK_BACK,
@@ -27,8 +25,10 @@ from quadriga.shared.wire.codes import (
     STANDS_AGAIN,
     code_of,
 )
-from quadriga.shared.wire.messages import Event, Status
-from quadriga.shared.wire.topics import EVENT, STATUS, TRUTH, find_topic
+from quadriga.shared.messages import Event, Status
+from quadriga.shared.recording.reader import Recording
+from quadriga.shared.runtime.clock import monotonic, sleep
+from quadriga.shared.topics import EVENT, STATUS, TRUTH, find_topic
 from quadriga.team.launch import Launch, router_row
 from tests.runtime.conftest import WAIT, Make, Team
 from tests.runtime.frozen import await_tick
@@ -40,7 +40,7 @@ Told = tuple[str, str]  # robot, code of an event
 IsSo = Callable[[Status], bool]
 REAL = {
     "world__mode": "realtime",
-    "world__seconds": 600.0,
+    "world__duration": 600.0,
     "team__auto_resume": True,
     "recorder__enabled": True,
 }

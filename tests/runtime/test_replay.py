@@ -26,20 +26,12 @@ from quadriga.replay.recorded_predictor import copy_predictor
 from quadriga.replay.saved_qp import load as load_qp
 from quadriga.replay.team_replay import replay
 from quadriga.shared.bus.session import Bus
+from quadriga.shared.codes import BACK
 from quadriga.shared.config.load import load
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.errors import ConfigError, RecordingError
+from quadriga.shared.messages import Command, Consumed, Measurement, Message, Plan, State, Status
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.wire.codes import BACK
-from quadriga.shared.wire.messages import (
-    Command,
-    Consumed,
-    Measurement,
-    Message,
-    Plan,
-    State,
-    Status,
-)
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import Launch, process_table
 from quadriga.what_if.what_if import Branch, WhatIf, answer_what_if
@@ -56,7 +48,7 @@ SWING = 300  # the tick at which the first feet leave the ground
 def walked(folder: Path, disturb: Disturb | None = None, **keys: Any) -> Path:
     """The recording of a walk of two robots with all processes."""
     given = {**DATA, "team.robots": 2, "bus.endpoint": free_endpoint(), "world.seed": 5}
-    given |= {"runtime.refuse_overload": False}
+    given |= {"runtime.check_cpu": False}
     given |= {name.replace("__", "."): value for name, value in keys.items()}
     config = load(None, given)
     predictor = ensure_predictor(config, Console(stderr=True))
@@ -76,7 +68,7 @@ def walked(folder: Path, disturb: Disturb | None = None, **keys: Any) -> Path:
 
 @pytest.fixture(scope="module")
 def lockstep(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return walked(tmp_path_factory.mktemp("lockstep") / "run", world__seconds=1.0)
+    return walked(tmp_path_factory.mktemp("lockstep") / "run", world__duration=1.0)
 
 
 def replayed(path: Path, *robots: str, **keys: Any) -> list[ReplayOutcome]:
@@ -299,7 +291,7 @@ def check_exact_up_to_a_loss(path: Path, outcome: ReplayOutcome) -> None:
 @pytest.mark.usefixtures("_alone")
 def test_real_time_is_replayed_to_the_byte(tmp_path: Path) -> None:
     for attempt in range(5):  # on a busy machine links drop messages, and robots pass over states
-        run = walked(tmp_path / str(attempt), world__mode="realtime", world__seconds=1.5)
+        run = walked(tmp_path / str(attempt), world__mode="realtime", world__duration=1.5)
         outcomes = replayed(run)
         for outcome in outcomes:
             check_exact_up_to_a_loss(run, outcome)
@@ -315,7 +307,7 @@ def test_real_time_is_replayed_to_the_byte(tmp_path: Path) -> None:
 @pytest.mark.usefixtures("_alone")
 def test_what_was_taken_in_in_real_time_cannot_be_guessed(tmp_path: Path) -> None:
     for attempt in range(5):
-        run = walked(tmp_path / str(attempt), world__mode="realtime", world__seconds=0.5)
+        run = walked(tmp_path / str(attempt), world__mode="realtime", world__duration=0.5)
         before, lost, after = list(Recording(run).messages(Consumed, "r1"))[:3]
         path = rewritten(run, run.parent / "lost.mcap", without("team/r1/inputs", lost.tick))
         (outcome,) = replayed(path, "r1")
@@ -344,7 +336,7 @@ def test_waits_that_were_given_up_are_replayed_to_the_byte(tmp_path: Path) -> No
     run = walked(
         tmp_path / "run",
         frozen_for_a_while,
-        world__seconds=600.0,
+        world__duration=600.0,
         world__command_timeout=PATIENCE,
         planner__peer_timeout=0.1,
     )
@@ -359,7 +351,7 @@ def test_waits_that_were_given_up_are_replayed_to_the_byte(tmp_path: Path) -> No
 
 @pytest.mark.parametrize("kind", ["centralised"])
 def test_the_plans_of_a_central_planner_are_inputs(tmp_path: Path, kind: str) -> None:
-    run = walked(tmp_path / "run", world__seconds=0.7, planner__kind=kind)
+    run = walked(tmp_path / "run", world__duration=0.7, planner__kind=kind)
     outcomes = replayed(run)
     check_exact(run, outcomes, plans=False)
     assert not outcomes[0].verdict.equal["plan"]

@@ -19,7 +19,7 @@ def test_a_walk_with_a_frozen_robot_comes_out_equal(
 ) -> None:
     team = make_team(
         recorder__enabled=True,
-        world__seconds=600.0,
+        world__duration=600.0,
         world__command_timeout=PATIENCE,
         world__push="r1:50:90:0.3:0.1",
     )
@@ -40,7 +40,7 @@ def test_a_walk_with_a_fault_that_somebody_asked_for_comes_out_equal(
     make_team: Make, capsys: pytest.CaptureFixture[str]
 ) -> None:
     team = make_team(
-        team__robots=1, recorder__enabled=True, world__seconds=600.0, world__live_faults=True
+        team__robots=1, recorder__enabled=True, world__duration=600.0, world__live_faults=True
     )
     given = ("--config", str(team.folder / "config.toml"))
     with team.launch() as running:
@@ -60,7 +60,7 @@ def test_a_walk_with_a_fault_that_somebody_asked_for_comes_out_equal(
 def test_a_team_that_permits_no_faults_refuses_them(
     make_team: Make, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    team = make_team(team__robots=1, world__seconds=600.0)
+    team = make_team(team__robots=1, world__duration=600.0)
     with team.launch():
         team.await_log("sim", BEGUN)
         config = str(team.folder / "config.toml")

@@ -48,9 +48,9 @@ def await_routing(process: subprocess.Popen[str]) -> None:
 
 
 def test_the_same_walk_as_without_a_router_which_leaves_after_it(make_team: Make) -> None:
-    team = make_team(recorder__enabled=True, world__seconds=0.5)
+    team = make_team(recorder__enabled=True, world__duration=0.5)
     direct = payloads(team.run())
-    team = make_team(recorder__enabled=True, world__seconds=0.5, bus__mode="client")
+    team = make_team(recorder__enabled=True, world__duration=0.5, bus__mode="client")
     folder = team.folder / "routed"
     folder.mkdir()
     team = Team(team.config, folder)
@@ -63,7 +63,7 @@ def test_the_same_walk_as_without_a_router_which_leaves_after_it(make_team: Make
 
 
 def test_a_router_stays_until_it_is_told_to_leave(make_team: Make) -> None:
-    team = make_team(bus__mode="client", world__seconds=0.5)
+    team = make_team(bus__mode="client", world__duration=0.5)
     with router(team) as process:
         await_routing(process)
         with team.launch() as running:

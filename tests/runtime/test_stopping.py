@@ -9,9 +9,7 @@ import pytest
 from quadriga.commands.parser import main
 from quadriga.recordings.traces import read_traces
 from quadriga.shared.bus.session import Bus
-from quadriga.shared.robot.conventions import robot_names
-from quadriga.shared.runtime.clock import monotonic
-from quadriga.shared.wire.codes import (
+from quadriga.shared.codes import (
     ESTOPPED,
     FALL,
     HALTS,
@@ -23,7 +21,9 @@ from quadriga.shared.wire.codes import (
     STOP_ASKED,
     STOPPED,
 )
-from quadriga.shared.wire.topics import TRUTH
+from quadriga.shared.robots.conventions import robot_names
+from quadriga.shared.runtime.clock import monotonic
+from quadriga.shared.topics import TRUTH
 from tests.runtime.conftest import WAIT, Make
 from tests.runtime.frozen import await_tick
 
@@ -37,7 +37,7 @@ Watcher = Callable[..., Bus]
 def test_stopped_released_and_sent_on(
     make_team: Make, watcher: Watcher, capsys: pytest.CaptureFixture[str], mode: str, robots: int
 ) -> None:
-    keys = {"world__mode": mode, "world__seconds": 600.0, "recorder__enabled": True}
+    keys = {"world__mode": mode, "world__duration": 600.0, "recorder__enabled": True}
     team = make_team(team__robots=robots, **keys)
     file, names = str(team.folder / "config.toml"), robot_names(robots)
 

@@ -15,11 +15,11 @@ import pytest
 from mcap.reader import make_reader
 
 from quadriga.shared.bus.session import HERE, Bus
+from quadriga.shared.codec import encode
 from quadriga.shared.config.load import load
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.members import SIM
 from quadriga.shared.runtime.places import SOURCE
-from quadriga.shared.wire.codec import encode
 from quadriga.team.endpoint import free_endpoint
 from tests.listening import WAIT, await_listener, await_recorded
 from tests.plugins.wind.quadriga_wind import WIND, Wind
@@ -119,7 +119,7 @@ def test_it_is_exported_with_the_names_of_its_entries(
 
 
 def test_it_is_documented(environment: dict[str, str]) -> None:
-    page = run(environment, "quadriga.shared.wire.markdown").splitlines()
+    page = run(environment, "quadriga.shared.messages_page").splitlines()
     row = "| `wind` |  | [Wind](#wind) | anemometer |  | 100 ms | 1000 ms | yes |"
     assert row in page
     assert "| `velocity` | 3 | m/s | world |" in page

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import pytest
 
+from quadriga.shared.messages import Command
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.runtime.clock import monotonic, sleep
-from quadriga.shared.wire.messages import Command
 from quadriga.team.registry import running_teams
 from tests.runtime.conftest import WAIT
 

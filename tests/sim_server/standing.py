@@ -11,8 +11,8 @@ import numpy as np
 from quadriga.shared.config.motors import MotorsConfig
 from quadriga.shared.config.presets import PRESETS
 from quadriga.shared.config.sections import Config, SensorsConfig, TeamConfig, WorldConfig
-from quadriga.shared.robot.conventions import N_JOINTS
-from quadriga.shared.wire.messages import Command
+from quadriga.shared.messages import Command
+from quadriga.shared.robots.conventions import N_JOINTS
 from quadriga.sim_server.world.world import World
 from tests.a1 import q_stand
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.robot.spec import Geometry
+from quadriga.shared.robots.conventions import Array
+from quadriga.shared.robots.spec import Geometry
 from quadriga.shared.runtime.jit import compiled
 
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from quadriga.agents.controller.maths.links import LINK, ZERO, leg_state
 from quadriga.agents.controller.maths.spatial import Vector, momentum_of, power, vector_product
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.robot.spec import Geometry
+from quadriga.shared.robots.conventions import Array
+from quadriga.shared.robots.spec import Geometry
 from quadriga.shared.runtime.jit import compiled
 
 _STRETCHED = 0.1  # of the volume that the columns of J span, in cubes of the thigh's length

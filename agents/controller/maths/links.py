@@ -22,7 +22,7 @@ from quadriga.agents.controller.maths.spatial import (
     vector_product,
 )
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.jit import compiled
 
 _JOINTS: Final = ("JointModelFreeFlyer", *4 * ("JointModelRX", "JointModelRY", "JointModelRY"))

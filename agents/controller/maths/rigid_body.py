@@ -39,7 +39,7 @@ from quadriga.agents.controller.maths.spatial import (
     to_world,
     vector_product,
 )
-from quadriga.shared.robot.conventions import GRAVITY, Array
+from quadriga.shared.robots.conventions import GRAVITY, Array
 from quadriga.shared.runtime.jit import compiled
 
 

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import numba
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.wire.messages import cuts_of
+from quadriga.shared.messages import cuts_of
+from quadriga.shared.robots.conventions import Array
 
 
 def places(**sizes: int) -> dict[str, Any]:

@@ -6,7 +6,7 @@ A motion or a force is a pair of vectors, linear and angular, about one point an
 
 from __future__ import annotations
 
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.jit import compiled
 
 Vector = tuple[float, float, float]

@@ -19,7 +19,7 @@ from quadriga.agents.controller.maths.dense import (
 from quadriga.agents.controller.maths.rigid_body import RigidBodyTerms
 from quadriga.agents.controller.maths.rotation import cross
 from quadriga.agents.controller.whole_body.problem import Goal, Weights, WholeBodyProblem
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.jit import compiled
 
 

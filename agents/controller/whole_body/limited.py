@@ -15,9 +15,9 @@ from quadriga.agents.controller.whole_body.problem import (
     SOLUTION_SIZE,
     WholeBodyProblem,
 )
-from quadriga.shared.robot.conventions import N_FORCES, N_JOINTS, N_LEGS, Array
+from quadriga.shared.codes import with_detail
+from quadriga.shared.robots.conventions import N_FORCES, N_JOINTS, N_LEGS, Array
 from quadriga.shared.runtime.jit import compiled
-from quadriga.shared.wire.codes import with_detail
 
 _UNBOUNDED: Final = 1e30  # DAQP's infinity
 _OPTIMAL: Final = 1  # DAQP's flag

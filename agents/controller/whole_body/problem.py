@@ -19,7 +19,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from quadriga.shared.config.sections import ControllerConfig
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.jit import compiled
 from quadriga.shared.runtime.record import record
 

@@ -23,7 +23,7 @@ from quadriga.agents.controller.whole_body.problem import (
     WholeBodyProblem,
     WholeBodySolution,
 )
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.jit import compiled
 
 _TOLERANCE: Final = 1e-9

@@ -157,10 +157,10 @@ def _choose_workers(workers: Workers, out: Path) -> Callable[[Sequence[TrialJob]
     walk = _choose_own_workers(workers)
 
     def walk_all(todo: Sequence[TrialJob]) -> Outcomes:
-        own = [job for job in todo if not job.config.team.controller]
+        own = [job for job in todo if not job.config.team.agent_command]
         if own:
             yield from walk(own)
-        yield from _walk_over_bus([job for job in todo if job.config.team.controller], out)
+        yield from _walk_over_bus([job for job in todo if job.config.team.agent_command], out)
 
     return walk_all
 

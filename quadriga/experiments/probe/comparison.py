@@ -13,7 +13,7 @@ from quadriga.agents.time_grid import gait_phase
 from quadriga.experiments.probe.pulses import DIRECTIONS
 from quadriga.experiments.probe.responses import Responses
 from quadriga.shared.config.sections import GaitConfig
-from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, OUTPUTS, Array
+from quadriga.shared.robots.conventions import N_FORCES, N_OUTPUTS, OUTPUTS, Array
 
 ByOutput = Mapping[str, float | None]  # None where there is nothing to divide by
 

@@ -16,8 +16,8 @@ from quadriga.experiments.probe.pulses import DIRECTIONS, PULSE_MS, pulse_forces
 from quadriga.experiments.probe.responses import Repetition
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array, robot_names
-from quadriga.shared.wire.topics import SAMPLE_MS
+from quadriga.shared.robots.conventions import N_FORCES, N_OUTPUTS, Array, robot_names
+from quadriga.shared.topics import SAMPLE_MS
 from quadriga.team.operator import references_of
 
 _NO_FORCE = np.zeros(N_FORCES)

@@ -20,8 +20,8 @@ from quadriga.experiments.probe.pulses import DIRECTIONS, DIRECTIONS_TEXT, FORCE
 from quadriga.experiments.probe.responses import Responses
 from quadriga.shared.config.sections import Config, GaitConfig
 from quadriga.shared.config.write import config_sha256
-from quadriga.shared.robot.conventions import Array, robot_names
-from quadriga.shared.wire.topics import SAMPLE_MS
+from quadriga.shared.robots.conventions import Array, robot_names
+from quadriga.shared.topics import SAMPLE_MS
 
 _FORMAT: Final = 1
 

@@ -15,8 +15,8 @@ from quadriga.charts.draw import tidy_axes
 from quadriga.charts.files import save_png
 from quadriga.experiments.probe.outcome import ProbeOutcome
 from quadriga.experiments.probe.pulses import DIRECTIONS
-from quadriga.shared.robot.conventions import OUTPUTS, Array, robot_names
-from quadriga.shared.wire.topics import SAMPLE_MS
+from quadriga.shared.robots.conventions import OUTPUTS, Array, robot_names
+from quadriga.shared.topics import SAMPLE_MS
 from quadriga.tables import LABELS, UNITS
 
 _SIZE: Final = (17.0, 8.0)  # inch

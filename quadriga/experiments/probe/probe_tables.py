@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from quadriga.experiments.probe.comparison import ByOutput
 from quadriga.experiments.probe.outcome import PredictorOutcome, ProbeOutcome
 from quadriga.experiments.probe.pulses import DIRECTIONS_TEXT
-from quadriga.shared.robot.conventions import OUTPUTS, robot_names
+from quadriga.shared.robots.conventions import OUTPUTS, robot_names
 from quadriga.tables import Table, format_number
 
 _OVERALL = (

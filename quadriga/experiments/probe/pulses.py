@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from quadriga.agents.gait import scheduled_stance
 from quadriga.agents.time_grid import step_ms, walking_steps
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import N_LEGS, Array
+from quadriga.shared.robots.conventions import N_LEGS, Array
 
 # Two feet on a diagonal can give a force along each axis, a moment about the other diagonal and
 # one about the vertical. A moment about their own diagonal they cannot give.

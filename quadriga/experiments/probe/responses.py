@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadriga.shared.errors import PredictorFileError
-from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
+from quadriga.shared.robots.conventions import N_FORCES, N_OUTPUTS, Array
 from quadriga.shared.runtime.atomic import atomic_write
 from quadriga.shared.runtime.npz import UNREADABLE, as_counts, as_measured, open_npz
 

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from quadriga.experiments.probe.measure import measure_robot
 from quadriga.shared.config.load import load
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 
 _SHORT: Final = {
     "gait.stand_ms": 100, "reference.ramp": 0.2, "planner.N": 21, "planner.applied": 20,

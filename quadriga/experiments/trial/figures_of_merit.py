@@ -25,8 +25,8 @@ from quadriga.recordings.traces import (
 )
 from quadriga.recordings.truth import distance
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import GRAVITY, N_LEGS, OUTPUTS, Array
-from quadriga.shared.wire.messages import Measurement
+from quadriga.shared.messages import Measurement
+from quadriga.shared.robots.conventions import GRAVITY, N_LEGS, OUTPUTS, Array
 
 _SHORTEST: Final = 0.5  # m; over a shorter way a cost of transport is that of starting
 

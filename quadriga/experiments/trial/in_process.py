@@ -19,12 +19,12 @@ from quadriga.recordings.traces import MeasurementTrace, Traces
 from quadriga.recordings.truth import build_truth_trace, ticks_of
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import PLANNER
+from quadriga.shared.messages import Event, Measurement, Status, Truth
 from quadriga.shared.planner_kinds import find_kind
-from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic_ns
 from quadriga.shared.runtime.collector import collector_off
-from quadriga.shared.wire.messages import Event, Measurement, Status, Truth
-from quadriga.shared.wire.topics import REFERENCE_EPOCH_MS, SAMPLE_MS
+from quadriga.shared.topics import REFERENCE_EPOCH_MS, SAMPLE_MS
 from quadriga.sim_server.world.layout import NV
 from quadriga.sim_server.world.world import World
 from quadriga.team.operator import reference_at, references_of
@@ -52,7 +52,7 @@ def roll_out(
     planner: TeamPlanner | None,
     watch: Callable[[Tick], None] | None = None,
 ) -> Walk:
-    """Walk in this process, until `world.seconds` are over or a robot has fallen.
+    """Walk in this process, until `world.duration` are over or a robot has fallen.
 
     Args:
         config: the team's configuration.
@@ -63,7 +63,7 @@ def roll_out(
     timed = None if planner is None else _TimedPlanner(planner)
     rollout = Rollout(config, None, references_of(config), planner=timed, agents=agents)
     log, meter = _WalkLog(config), _WorkMeter(rollout.world)
-    last = round(1000 * config.world.seconds)
+    last = round(1000 * config.world.duration)
     with collector_off():
         while rollout.world.tick < last and not rollout.world.fallen():
             if rollout.world.tick % SAMPLE_MS == 0:

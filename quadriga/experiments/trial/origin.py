@@ -32,7 +32,7 @@ def foreign_origin(config: Config) -> str:
     Raises:
         ConfigError: it cannot be found, or not be read.
     """
-    return controller_origin(config.team.controller) or plugin_origin(config.planner.kind)
+    return controller_origin(config.team.agent_command) or plugin_origin(config.planner.kind)
 
 
 @lru_cache(maxsize=1)

@@ -10,13 +10,13 @@ from typing import Final
 from quadriga.experiments.trial.figures_of_merit import Walk
 from quadriga.recordings.summary import RECORDING
 from quadriga.recordings.traces import read_traces
+from quadriga.shared.codes import with_detail
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ProcessError, RecordingError
+from quadriga.shared.messages import Measurement
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.conventions import robot_names
-from quadriga.shared.wire.codes import with_detail
-from quadriga.shared.wire.messages import Measurement
-from quadriga.shared.wire.topics import EVENT, MEASUREMENT, PLAN, REFERENCE, STATUS, TRUTH
+from quadriga.shared.robots.conventions import robot_names
+from quadriga.shared.topics import EVENT, MEASUREMENT, PLAN, REFERENCE, STATUS, TRUTH
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import Launch, process_table
 from quadriga.team.run_folder import make_run_dir
@@ -48,7 +48,7 @@ def walk_over_bus(config: Config, run_dir: Path, predictor: Path | None, sha256:
         try:
             launch.watch(lambda: False)
         except ProcessError as error:
-            if not config.team.controller:
+            if not config.team.agent_command:
                 raise
             failed = error
     return _read_failed(config, run_dir, failed) if failed else read_walk(run_dir / RECORDING)

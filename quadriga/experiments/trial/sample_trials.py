@@ -19,16 +19,16 @@ from quadriga.identification.sample_fits import linear_episode
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.planner_kinds import find_kind
-from quadriga.shared.robot.conventions import N_FORCES, N_OUTPUTS, Array
+from quadriga.shared.robots.conventions import N_FORCES, N_OUTPUTS, Array
 
 # Full speed from 0.2 s on, so that 1.4 s have a steady part of 0.2 s.
 _KEYS: Final = {
-    "world.seed": 3, "world.seconds": 1.4, "world.scatter": 0.02, "gait.stand_ms": 100,
+    "world.seed": 3, "world.duration": 1.4, "world.scatter": 0.02, "gait.stand_ms": 100,
     "reference.ramp": 0.1, "reference.vx": 0.5, "reference.wz": 0.2, "planner.N": 10,
     "planner.T_ini": 4,
 }  # fmt: skip
 _NONE: Final = {"planner.kind": "none"}
-_SHORT: Final = {"world.seconds": 0.8}
+_SHORT: Final = {"world.duration": 0.8}
 _TRIALS: Final[tuple[dict[str, Any], ...]] = (
     _NONE | {
         "team.robots": 3, "team.yokes": "ring", "world.terrain": "boxes",

@@ -106,7 +106,7 @@ def _start(tuning: Tuning) -> Config:
     )
     first, *others = plan.configs.values()
     tuning.start_values(first)
-    for key in dict.fromkeys((*(tuned.key for tuned in tuning.keys), "world.seconds")):
+    for key in dict.fromkeys((*(tuned.key for tuned in tuning.keys), "world.duration")):
         found = {look_up(config, key) for config in (first, *others)}
         if len(found) > 1:
             raise ConfigError(
@@ -160,7 +160,7 @@ def _plan(
 def _judge(
     plan: CampaignPlan, rows: list[TrialOutcome], values: list[dict[str, float]]
 ) -> Generation:
-    seconds = next(iter(plan.configs.values())).world.seconds
+    seconds = next(iter(plan.configs.values())).world.duration
     walks = [
         by_world(row for row in rows if row.variant == variant.name) for variant in plan.variants
     ]

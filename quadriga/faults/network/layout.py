@@ -14,7 +14,7 @@ from typing import Final
 
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import OPERATOR
-from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.robots.conventions import robot_names
 
 TEAM: Final = "team"
 NETWORKS: Final = 512  # that one machine can have at a time

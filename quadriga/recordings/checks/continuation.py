@@ -7,7 +7,7 @@ from pathlib import Path
 from quadriga.recordings.checks.finding import CheckedMessage, Finding
 from quadriga.shared.errors import RecordingError
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.wire.topics import STATE
+from quadriga.shared.topics import STATE
 
 
 class Continuation:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from quadriga.recordings.checks.finding import CheckedMessage, Finding
+from quadriga.shared.messages import Event
 from quadriga.shared.recording.metadata import END
-from quadriga.shared.wire.messages import Event
 
 
 class Ending:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Final, Protocol
 
-from quadriga.shared.wire.messages import Message
+from quadriga.shared.messages import Message
 
 SHOWN: Final = 5  # objections that are kept one by one
 

@@ -7,8 +7,8 @@ from typing import Final, NamedTuple
 
 from quadriga.agents.modes import RISING, WALK
 from quadriga.recordings.checks.finding import CheckedMessage, Finding
-from quadriga.shared.wire.messages import Status
-from quadriga.shared.wire.topics import PLAN
+from quadriga.shared.messages import Status
+from quadriga.shared.topics import PLAN
 
 _MOST: Final = 100_000  # doubts that are kept; beyond that there is something else amiss
 _WINDOW_MS: Final = 1000  # in which windows and plans fill again, after it

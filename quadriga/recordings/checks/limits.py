@@ -12,9 +12,9 @@ from quadriga.agents.time_grid import horizon_stance
 from quadriga.recordings.checks.finding import CheckedMessage, Finding
 from quadriga.recordings.checks.getting_up import Doubts, GettingUp
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import JOINT_NAMES, Array, Leg, robot_names
-from quadriga.shared.robot.robots import ROBOTS
-from quadriga.shared.wire.messages import Command, Plan
+from quadriga.shared.messages import Command, Plan
+from quadriga.shared.robots.conventions import JOINT_NAMES, Array, Leg, robot_names
+from quadriga.shared.robots.registry import ROBOTS
 
 TOLERANCE: Final = 1e-6  # N and N·m
 
@@ -86,7 +86,7 @@ class Torques:
             self._limit = config.robot.torque_limit
         else:
             self.finding.notes.append(f"limits of {config.team.robot!r} are not known here")
-        self._any_gains = bool(config.team.controller)
+        self._any_gains = bool(config.team.agent_command)
         self._largest = 0.0
 
     def look(self, item: CheckedMessage) -> None:

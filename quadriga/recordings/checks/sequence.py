@@ -9,10 +9,10 @@ from quadriga.recordings.checks.getting_up import Doubts, GettingUp
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import max_ages, periods
 from quadriga.shared.members import AGENT, PLANNER
+from quadriga.shared.messages import Event, Plan, Status
 from quadriga.shared.recording.ticks import TickTrack
-from quadriga.shared.robot.conventions import robot_names
-from quadriga.shared.wire.messages import Event, Plan, Status
-from quadriga.shared.wire.topics import COMMAND, MEASUREMENT, STATE, TABLE, WORDS
+from quadriga.shared.robots.conventions import robot_names
+from quadriga.shared.topics import COMMAND, MEASUREMENT, STATE, TABLE, WORDS
 
 _MAY_REPEAT: Final = frozenset(topic.name for topic in TABLE if topic.repeats)
 # What is never passed over, not even in real time: agents and planners skip steps, others do not.
@@ -35,7 +35,7 @@ class Order:
         """Of a recording made with this configuration."""
         self.finding = Finding("order", "messages")
         self._last: dict[str, tuple[int, int]] = {}
-        self._own_plants = config.team.plants == "each"
+        self._own_plants = config.team.plant_per_robot
 
     def look(self, item: CheckedMessage) -> None:
         message = item.message
@@ -117,7 +117,7 @@ class Gaps:
             self.finding.notes.append(f"begins at tick {begin}")
         if self._filtered:
             return
-        of_each = _CONTROLLER_S if team.controller else _EVERYONE_S
+        of_each = _CONTROLLER_S if team.agent_command else _EVERYONE_S
         for robot in robot_names(team.robots):
             for topic in of_each:
                 self._check_end(topic.key(team.name, robot), topic.name, end)

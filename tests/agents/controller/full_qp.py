@@ -10,7 +10,7 @@ import pinocchio as pin
 from scipy import sparse
 
 from quadriga.agents.controller.whole_body.problem import Goal, Weights
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from tests.a1 import TORQUE_LIMIT
 from tests.agents.controller.poses import FEET, MODEL, Pose
 

@@ -30,8 +30,8 @@ from quadriga.agents.controller.trunk_feedback import (
     feedforward,
 )
 from quadriga.shared.config.sections import Config, ControllerConfig
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.wire.messages import State
+from quadriga.shared.messages import State
+from quadriga.shared.robots.conventions import Array
 from tests.a1 import BODY
 
 RULE = foot_load_rule(Config())

@@ -12,8 +12,8 @@ from quadriga.agents.controller.foot_load import FootLoad
 from quadriga.agents.controller.maths.rigid_body import RigidBodyTerms
 from quadriga.agents.controller.model import RigidBody
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import A1
-from quadriga.shared.robot.conventions import FOOT_FRAMES, N_JOINTS, Array
+from quadriga.shared.robots.a1 import A1
+from quadriga.shared.robots.conventions import FOOT_FRAMES, N_JOINTS, Array
 from tests.a1 import STAND_HEIGHT, build_pinocchio_model, q_stand
 
 MODEL = build_pinocchio_model()

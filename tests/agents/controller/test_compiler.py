@@ -10,7 +10,7 @@ import numpy as np
 
 from quadriga.agents.agent import Agent, Inputs
 from quadriga.shared.config.sections import Config, GaitConfig, PlannerConfig, TeamConfig
-from quadriga.shared.wire.messages import Reference
+from quadriga.shared.messages import Reference
 from tests.a1 import standing
 
 TICKS = 30

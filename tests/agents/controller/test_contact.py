@@ -9,7 +9,7 @@ import pytest
 
 from quadriga.agents.controller.schedule import Schedule
 from quadriga.shared.config.sections import ControllerConfig, GaitConfig
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from tests.a1 import FOOT_RADIUS
 from tests.agents.controller.parts import ContactState, initial_contact, step_contact
 

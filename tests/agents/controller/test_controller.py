@@ -22,8 +22,8 @@ from quadriga.agents.controller.swing import (
 from quadriga.agents.controller.trunk_feedback import trunk_gains
 from quadriga.agents.controller.whole_body.solution import solve_goal
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.a1 import A1
-from quadriga.shared.robot.conventions import GRAVITY, Array
+from quadriga.shared.robots.a1 import A1
+from quadriga.shared.robots.conventions import GRAVITY, Array
 from tests.a1 import STAND_HEIGHT, TOTAL_MASS, nominal_forces, standing, standing_filter
 from tests.agents.controller.parts import (
     estimate_trunk,

@@ -20,8 +20,8 @@ from quadriga.agents.controller.estimator import (
 )
 from quadriga.agents.controller.maths.rotation import rotation_matrix
 from quadriga.shared.config.sections import EstimatorConfig
-from quadriga.shared.robot.conventions import GRAVITY, N_JOINTS, Array
-from quadriga.shared.wire.messages import State, Truth
+from quadriga.shared.messages import State, Truth
+from quadriga.shared.robots.conventions import GRAVITY, N_JOINTS, Array
 from tests.a1 import FOOT_RADIUS, GEOMETRY, STAND_HEIGHT, q_stand, standing_filter
 from tests.agents.controller.parts import RULE, estimate_trunk
 from tests.agents.controller.poses import FEET, MODEL, pose_of

@@ -18,7 +18,7 @@ from quadriga.agents.controller.foot_load import (
 )
 from quadriga.agents.controller.maths.leg_reaction import LegMotion
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import GRAVITY, N_LEGS, Array
+from quadriga.shared.robots.conventions import GRAVITY, N_LEGS, Array
 from tests.a1 import GEOMETRY, q_stand
 from tests.agents.controller.maths.test_leg_reaction import contact_torques
 from tests.agents.controller.poses import BODY, standing_pose

@@ -8,7 +8,7 @@ import pytest
 from quadriga.agents.controller.friction import FrictionRule, update_mu_reduction
 from quadriga.agents.controller.schedule import GaitPhase
 from quadriga.agents.controller.sensed import FeetState
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 
 CONTACT, STANCE = np.array([1.0, 0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0, 1.0])
 MU, LEAST, SLIPPERY, SPEED, LOAD, RECOVERY, DT = 0.6, 0.25, 0.12, 0.25, 20.0, 0.02, 1e-3

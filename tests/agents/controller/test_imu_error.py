@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from quadriga.agents.controller.imu_error import update_imu_error, without_imu_error
 from quadriga.agents.controller.readings import Readings
-from quadriga.shared.robot.conventions import GRAVITY, Array
+from quadriga.shared.robots.conventions import GRAVITY, Array
 
 DT = 1e-3
 UP = np.array([0.0, 0.0, GRAVITY])

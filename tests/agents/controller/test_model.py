@@ -11,8 +11,8 @@ import pytest
 from quadriga.agents.controller.maths.links import link_table
 from quadriga.agents.controller.model import RigidBody
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot import pinocchio_model
-from quadriga.shared.robot.a1 import A1
+from quadriga.shared.robots import pinocchio_model
+from quadriga.shared.robots.a1 import A1
 from tests.a1 import TOTAL_MASS, q_stand
 from tests.agents.controller.poses import BODY, FEET, MODEL, random_pose
 

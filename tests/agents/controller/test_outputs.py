@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from quadriga.agents.controller.estimator import Estimate
 from quadriga.agents.controller.sensing import outputs_at
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from tests.agents.controller.poses import random_pose
 
 

@@ -15,8 +15,8 @@ from quadriga.shared.config.sections import (
     TeamConfig,
     WorldConfig,
 )
-from quadriga.shared.robot.conventions import GRAVITY
-from quadriga.shared.wire.messages import Reference
+from quadriga.shared.messages import Reference
+from quadriga.shared.robots.conventions import GRAVITY
 from tests.a1 import TOTAL_MASS
 from tests.agents.controller.poses import BODY, MODEL, random_pose
 
@@ -68,7 +68,7 @@ def test_a_load_leaves_the_table_as_it_was() -> None:
 def test_a_walking_robot_finds_out_what_it_carries(payload: float) -> None:
     config = Config(
         team=TeamConfig(robots=1),
-        world=WorldConfig(payload=payload, seconds=6.0),
+        world=WorldConfig(payload=payload, duration=6.0),
         estimator=EstimatorConfig(),
         planner=PlannerConfig(kind="none"),
     )

@@ -16,7 +16,7 @@ from quadriga.agents.controller.standing_heading import (
 )
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.config.load import load
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from quadriga.team.operator import references_of
 
 DT = 1e-3

@@ -16,8 +16,8 @@ from quadriga.agents.controller.swing import (
     limit_inwards,
     swing_reference,
 )
-from quadriga.shared.robot.a1 import A1
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.a1 import A1
+from quadriga.shared.robots.conventions import Array
 from tests.a1 import FOOT_RADIUS
 
 START, TARGET = np.array([0.1, -0.2, 0.03]), np.array([0.25, -0.15])

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from quadriga.agents.controller.torque_bounds import torque_bounds
-from quadriga.shared.robot.a1 import A1
-from quadriga.shared.robot.torque_speed import motor_curves
+from quadriga.shared.robots.a1 import A1
+from quadriga.shared.robots.torque_speed import motor_curves
 from quadriga.sim_server.world.motors import Motors
 from tests.sim_server.standing import IDEAL_MOTORS, command
 

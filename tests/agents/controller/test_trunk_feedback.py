@@ -20,7 +20,7 @@ from quadriga.agents.controller.trunk_feedback import (
     trunk_gains,
 )
 from quadriga.shared.config.sections import Config, ControllerConfig
-from quadriga.shared.robot.conventions import GRAVITY, Array
+from quadriga.shared.robots.conventions import GRAVITY, Array
 from tests.a1 import STAND_HEIGHT
 from tests.agents.controller.parts import initial_integrators, rigid, trunk_acceleration, trunk_at
 from tests.agents.controller.poses import BODY, random_pose, standing_pose

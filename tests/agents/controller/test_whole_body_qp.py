@@ -20,8 +20,8 @@ from quadriga.agents.controller.whole_body.problem import (
     WholeBodySolution,
 )
 from quadriga.agents.controller.whole_body.solution import solve_goal
-from quadriga.shared.robot.a1 import A1
-from quadriga.shared.robot.conventions import GRAVITY, Array
+from quadriga.shared.robots.a1 import A1
+from quadriga.shared.robots.conventions import GRAVITY, Array
 from tests.a1 import TORQUE_LIMIT, TOTAL_MASS
 from tests.agents.controller.full_qp import desired, dynamics, solve_full
 from tests.agents.controller.poses import Pose, random_pose, standing_pose

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from quadriga.shared.wire.messages import Event
+from quadriga.shared.messages import Event
 from tests.a1 import standing
 from tests.agents.inbox.test_inbox import arrivals, feed
 

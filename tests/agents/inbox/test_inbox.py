@@ -11,9 +11,9 @@ import pytest
 
 from quadriga.agents.inbox.inbox import Inbox
 from quadriga.agents.planning.interface import Expected
+from quadriga.shared.codec import encode
 from quadriga.shared.config.load import load
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.messages import (
+from quadriga.shared.messages import (
     EStop,
     Event,
     Measurement,
@@ -24,7 +24,7 @@ from quadriga.shared.wire.messages import (
     SafeStop,
     Truth,
 )
-from quadriga.shared.wire.topics import ESTOP, TABLE, WORDS, Topic
+from quadriga.shared.topics import ESTOP, TABLE, WORDS, Topic
 from tests.a1 import standing
 
 NOTHING = Expected()

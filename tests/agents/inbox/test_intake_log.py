@@ -15,18 +15,10 @@ from quadriga.agents.inbox.intake_log import (
     parse_message_id,
 )
 from quadriga.agents.planning.interface import NOTHING, Expected
+from quadriga.shared.codec import encode
+from quadriga.shared.codes import GONE
 from quadriga.shared.config.load import load
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.codes import GONE
-from quadriga.shared.wire.messages import (
-    Consumed,
-    EStop,
-    Event,
-    Measurement,
-    Plan,
-    Reference,
-    Status,
-)
+from quadriga.shared.messages import Consumed, EStop, Event, Measurement, Plan, Reference, Status
 from tests.a1 import standing
 
 PLAN = Plan(480, 0, 12, np.zeros((25, 12)), np.zeros((25, 6)), "solved", {}, 1)

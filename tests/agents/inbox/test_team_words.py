@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.codes import BACK, FALL, GONE, LOWERED, PUSH
-from quadriga.shared.wire.messages import Event, Status
+from quadriga.shared.codec import encode
+from quadriga.shared.codes import BACK, FALL, GONE, LOWERED, PUSH
+from quadriga.shared.messages import Event, Status
 from tests.a1 import standing
 from tests.agents.inbox.test_inbox import NOTHING, arrivals, feed
 

@@ -17,7 +17,7 @@ from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.predictor.store import Provenance
 from quadriga.shared.config.sections import Config, PlannerConfig
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 
 
 def test_what_is_saved_is_loaded(

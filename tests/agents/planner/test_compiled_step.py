@@ -15,7 +15,7 @@ from quadriga.agents.planner.planner import PlannerInputs
 from quadriga.agents.planner.planner_qp import unpack
 from quadriga.agents.planner.qp_solver import SOLVED, SOLVERS
 from quadriga.shared.config.sections import PlannerConfig
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from tests.a1 import WEIGHT, build_problem, nominal_forces
 
 T_INI, N = 3, 5

@@ -37,7 +37,7 @@ from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.time_grid import horizon_stance, walking_steps
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from tests.a1 import WEIGHT, nominal_forces
 from tests.agents.calm import BASE, NOTHING, STEP, Team, inputs_of, peer, terms_of
 

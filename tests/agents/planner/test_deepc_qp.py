@@ -22,7 +22,7 @@ from quadriga.agents.predictor.hankel import hankel
 from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config, PlannerConfig
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from tests.a1 import WEIGHT, nominal_forces
 
 Team = Callable[..., Any]

@@ -24,7 +24,7 @@ from quadriga.agents.planner.optimality import residuals
 from quadriga.agents.planner.planner_qp import PlannerProblem
 from quadriga.agents.planner.qp_solver import SOLVED, SOLVERS
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from tests.a1 import build_problem
 
 N = 6

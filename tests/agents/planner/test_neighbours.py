@@ -15,8 +15,8 @@ from quadriga.agents.planner.neighbours import FRESH, HELD, LOST, SHIFTED, Neigh
 from quadriga.agents.planner.peer_memory import PeerMemory
 from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.wire.messages import Measurement, Plan
+from quadriga.shared.messages import Measurement, Plan
+from quadriga.shared.robots.conventions import Array
 from tests.a1 import nominal_forces
 
 CONFIG = Config()

@@ -13,7 +13,7 @@ from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from tests.a1 import nominal_forces
 from tests.agents.calm import BASE, NOTHING, STEP, Team, inputs_of, peer, plan, terms_of
 

@@ -16,7 +16,7 @@ from quadriga.agents.planner.planner_qp import Condensed, PlannerProblem, unpack
 from quadriga.agents.planner.qp_solver import SOLVED, SOLVERS, Solver, judge
 from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config, PlannerConfig
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from tests.a1 import build_problem, nominal_forces
 
 N = 8

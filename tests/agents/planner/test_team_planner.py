@@ -18,7 +18,7 @@ from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from tests.a1 import WEIGHT, nominal_forces
 
 BASE = np.array([0.26, 0.4, 0.0, 0.0, 0.0, 0.1])

@@ -14,7 +14,7 @@ from quadriga.agents.planning.local import LocalPlanning
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from tests.agents.duet import CONFIG, FIRST_PLAN, every_100_ms, record, simple_predictor
 
 ANSWERS = 2

@@ -20,8 +20,8 @@ from quadriga.agents.planning.local import LocalPlanning
 from quadriga.agents.planning.registry import CheckedPlanning
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config, PlannerConfig, TeamConfig
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.wire.messages import Measurement, Plan
+from quadriga.shared.messages import Measurement, Plan
+from quadriga.shared.robots.conventions import Array
 from tests.a1 import nominal_forces
 from tests.agents.duet import asked, simple_predictor
 
@@ -172,11 +172,11 @@ def test_a_plan_fades_out_beyond_the_range_of_the_data(
     output: int, excess: float, share: float
 ) -> None:
     """In proportion between once and twice the range, in every output, and so it is published."""
-    limits = np.array(ALONE.planner.fade)[[0, 1, 1, 2, 2, 3]]
+    limits = np.array(ALONE.planner.trust_range)[[0, 1, 1, 2, 2, 3]]
     y = ON_COURSE.copy()
     y[output] += excess * limits[output]
     y[1] -= 0.1 if output != 1 else 0.0  # something to correct in any case
-    wide = replace(ALONE, planner=replace(ALONE.planner, fade=(1e3, 1e3, 1e3, 1e3)))
+    wide = replace(ALONE, planner=replace(ALONE.planner, trust_range=(1e3, 1e3, 1e3, 1e3)))
     sure, wary = Walker(wide), Walker()
     full, faded = sure.walk(FIRST, y), wary.walk(FIRST, y)
     assert full.plan is not None
@@ -206,8 +206,8 @@ def test_the_speeds_of_a_plan_that_fades_out_give_way_to_those_asked_for(
     excess: float, share: float
 ) -> None:
     """What is published stays what the forces come to: without any, that is the free response."""
-    y = ON_COURSE + np.array([0.0, excess * ALONE.planner.fade[1], 0.0, 0.0, 0.0, 0.0])
-    wide = replace(ALONE, planner=replace(ALONE.planner, fade=(1e3, 1e3, 1e3, 1e3)))
+    y = ON_COURSE + np.array([0.0, excess * ALONE.planner.trust_range[1], 0.0, 0.0, 0.0, 0.0])
+    wide = replace(ALONE, planner=replace(ALONE.planner, trust_range=(1e3, 1e3, 1e3, 1e3)))
     wary = Walker()
     full, faded = Walker(wide).walk(FIRST, y), wary.walk(FIRST, y)
     assert full.plan is not None

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quadriga.agents.planning.operator_references import reference_at, remember_references
-from quadriga.shared.wire.messages import Reference
+from quadriga.shared.messages import Reference
 
 HEIGHT = 0.26
 

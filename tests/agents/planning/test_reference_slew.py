@@ -11,9 +11,9 @@ import pytest
 from quadriga.agents.inbox.inbox import Inbox
 from quadriga.agents.planning.interface import Expected
 from quadriga.agents.planning.reference_slew import ReferenceSlew, most_change
+from quadriga.shared.codec import encode
 from quadriga.shared.config.load import load
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.messages import Reference
+from quadriga.shared.messages import Reference
 from quadriga.team.operator import reference_at
 from quadriga.team.scenarios import path
 from tests.a1 import standing

@@ -16,8 +16,8 @@ from quadriga.agents.planning.remote import RemotePlanning
 from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config, PlannerConfig, TeamConfig
 from quadriga.shared.config.timing import max_ages
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.wire.messages import Measurement, Plan
+from quadriga.shared.messages import Measurement, Plan
+from quadriga.shared.robots.conventions import Array
 from tests.a1 import nominal_forces
 from tests.agents.duet import asked
 
@@ -141,7 +141,7 @@ def test_the_age_of_the_plan_in_use_is_told_at_every_tick() -> None:
 
 
 def test_a_plan_fades_out_beyond_the_range_of_the_data() -> None:
-    far = ON_COURSE + np.array([0.0, 1.5 * CONFIG.planner.fade[1], 0.0, 0.0, 0.0, 0.0])
+    far = ON_COURSE + np.array([0.0, 1.5 * CONFIG.planner.trust_range[1], 0.0, 0.0, 0.0, 0.0])
     state, outputs = follow(follower_of(), NOTHING_YET, 321, plan_of(8), y=far)
     assert applied(state, 321).max() == pytest.approx(4.0)
     assert outputs.unusual == ("plan_faded",)
@@ -150,7 +150,7 @@ def test_a_plan_fades_out_beyond_the_range_of_the_data() -> None:
 def test_speeds_of_a_plan_that_fades_out_give_way_to_those_asked_for() -> None:
     follower, faster = follower_of(), plan_of(8)
     faster = replace(faster, y=faster.y + np.array([0.0, 0.2, 0.1, 0.0, 0.0, 0.0]))
-    off = np.array([0.0, CONFIG.planner.fade[1], 0.0, 0.0, 0.0, 0.0])
+    off = np.array([0.0, CONFIG.planner.trust_range[1], 0.0, 0.0, 0.0, 0.0])
     for times, share in ((0.0, 1.0), (1.5, 0.5), (2.0, 0.0)):
         state, _ = follow(follower, NOTHING_YET, 321, faster, y=ON_COURSE + times * off)
         y_ref = setpoint_at(state.plans, 321).y_ref

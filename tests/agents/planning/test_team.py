@@ -18,10 +18,10 @@ from quadriga.agents.planning.reference_slew import ReferenceSlew
 from quadriga.agents.planning.team import Central, CentralOutputs, CentralState
 from quadriga.agents.rehearsal import rehearse_central
 from quadriga.identification.rollout import Rollout
+from quadriga.shared.codec import encode
 from quadriga.shared.config.sections import Config, PlannerConfig, TeamConfig
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.messages import Measurement, Reference
+from quadriga.shared.messages import Measurement, Reference
+from quadriga.shared.robots.conventions import Array
 from tests.a1 import nominal_forces
 from tests.agents.duet import asked, every_100_ms, fingerprint, simple_predictor
 

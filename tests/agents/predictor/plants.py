@@ -9,7 +9,7 @@ import numpy as np
 
 from quadriga.agents.predictor.four_tank import LinearPlant
 from quadriga.agents.predictor.plant import Data
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 
 
 class Sizes(NamedTuple):

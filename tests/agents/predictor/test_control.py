@@ -17,7 +17,7 @@ from quadriga.agents.predictor.control import (
 from quadriga.agents.predictor.four_tank import FourTank, four_tank
 from quadriga.agents.predictor.plant import fit
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from tests.agents.predictor.plants import Sizes, random_plant, record, split_window
 
 

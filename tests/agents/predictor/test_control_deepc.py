@@ -25,7 +25,7 @@ from quadriga.agents.predictor.four_tank import four_tank
 from quadriga.agents.predictor.hankel import mosaic
 from quadriga.agents.predictor.plant import Data, fit
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from tests.agents.predictor.plants import Sizes, random_plant, record
 
 PAST, HORIZON = 2, 3

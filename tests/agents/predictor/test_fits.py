@@ -21,7 +21,7 @@ from quadriga.agents.predictor.regression import (
 )
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 
 Team = Callable[..., Any]
 T_INI, N = 3, 4

@@ -18,7 +18,7 @@ from quadriga.agents.predictor.gates import Bounds, GateReport, PeersFigures, pe
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.conventions import OUTPUTS
+from quadriga.shared.robots.conventions import OUTPUTS
 
 Team = Callable[..., Any]
 LIMIT = 0.02

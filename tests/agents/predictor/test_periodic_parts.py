@@ -15,7 +15,7 @@ from quadriga.agents.predictor.periodic import harmonics, polynomials, shrink, s
 from quadriga.agents.predictor.predictor import PredictorMeta
 from quadriga.agents.time_grid import gait_phase
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.robots import ROBOTS
+from quadriga.shared.robots.registry import ROBOTS
 
 META = PredictorMeta.of(Config())
 

@@ -7,7 +7,7 @@ import pytest
 
 from quadriga.agents.predictor.control import DataDrivenController, PlanWeights
 from quadriga.agents.predictor.plant import Data, fit, judge
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 
 PERIOD, PAST, HORIZON, FORGETS = 20, 3, 6, 0.8
 # Three inputs act by two numbers on each of two agents; agent 1 feels agent 0.

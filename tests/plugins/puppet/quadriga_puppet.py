@@ -6,7 +6,7 @@ import numpy as np
 
 from quadriga.plant.protocol import Plant
 from quadriga.shared.config.sections import Config
-from quadriga.shared.wire.messages import Command, Event, State
+from quadriga.shared.messages import Command, Event, State
 
 LAG = 20.0  # ticks, in which a joint has gone two thirds of its way
 LEVEL, STILL, UP = np.array([1.0, 0, 0, 0]), np.zeros(3), np.array([0, 0, 9.81])

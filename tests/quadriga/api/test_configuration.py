@@ -16,9 +16,9 @@ from quadriga.team.endpoint import with_free_endpoint
 
 def test_keys_lie_over_a_file_and_that_over_a_scenario(tmp_path: Path) -> None:
     file = tmp_path / "mine.toml"
-    file.write_text("[world]\nseed = 3\nseconds = 4.0\n", encoding="utf-8")
+    file.write_text("[world]\nseed = 3\nduration = 4.0\n", encoding="utf-8")
     config = quadriga.load_config(str(file), scenario="turn", set={"world.seed": 9})
-    assert (config.world.scenario, config.world.seed, config.world.seconds) == ("turn", 9, 4.0)
+    assert (config.world.scenario, config.world.seed, config.world.duration) == ("turn", 9, 4.0)
     assert config.reference.wz == quadriga.load_config(scenario="turn").reference.wz != 0.0
     assert quadriga.load_config() == quadriga.Config()
     with pytest.raises(quadriga.ConfigError, match=r"team\.robots: got 0"):

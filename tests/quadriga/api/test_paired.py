@@ -10,7 +10,7 @@ import pytest
 import quadriga
 from quadriga.experiments.campaign.ledger import Ledger
 from quadriga.experiments.statistics import Pairs, mcnemar, paired_difference
-from quadriga.shared.wire.messages import Event
+from quadriga.shared.messages import Event
 from tests.quadriga.conftest import run_config, write
 from tests.quadriga.experiments.rows import manifest, row
 

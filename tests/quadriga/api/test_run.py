@@ -13,10 +13,10 @@ from threadpoolctl import threadpool_info, threadpool_limits
 import quadriga
 from quadriga.agents.predictor.store import predictor_sha256
 from quadriga.recordings.summary import summarise
+from quadriga.shared import codes
+from quadriga.shared import messages as msg
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.runtime.blas import blas_threads_kept
-from quadriga.shared.wire import codes
-from quadriga.shared.wire import messages as msg
 from tests.golden import scenario
 from tests.quadriga.conftest import ESTIMATOR_ERROR, SPEED, WriteRun, run_config
 

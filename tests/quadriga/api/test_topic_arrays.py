@@ -11,10 +11,10 @@ import pytest
 
 import quadriga
 from quadriga.api import topic_reader
+from quadriga.shared import messages as msg
+from quadriga.shared.codec import decode
 from quadriga.shared.errors import ConfigError, RecordingError
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.wire import messages as msg
-from quadriga.shared.wire.codec import decode
 from tests.quadriga.conftest import WriteRun, run_config
 
 NOTHING = np.zeros(0)

@@ -9,11 +9,11 @@ import pytest
 
 from quadriga.commands.parser import main
 from quadriga.recordings.metadata import build_metadata
+from quadriga.shared import messages as msg
+from quadriga.shared.codec import encode
 from quadriga.shared.config.timing import periods
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.recording.writer import RecordingWriter
-from quadriga.shared.wire import messages as msg
-from quadriga.shared.wire.codec import encode
 from tests.quadriga.conftest import run_config, write
 
 RunCommand = Callable[..., tuple[int, list[str], str]]

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from mcap.writer import Writer
 
 from quadriga.recordings.metadata import build_metadata
+from quadriga.shared.messages import State
 from quadriga.shared.recording import metadata as recording_metadata
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.recording.writer import RecordingWriter
-from quadriga.shared.wire.messages import State
 from tests.quadriga.commands.conftest import CONFIG, RunCommand
 
 VERBS: dict[str, tuple[str, ...]] = {

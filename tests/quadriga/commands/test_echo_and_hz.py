@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from quadriga.recordings.metadata import build_metadata
+from quadriga.shared import messages as msg
+from quadriga.shared.codec import encode
 from quadriga.shared.recording.writer import RecordingWriter
-from quadriga.shared.wire import messages as msg
-from quadriga.shared.wire.codec import encode
 from tests.quadriga.commands.conftest import CONFIG, RunCommand
 from tests.quadriga.conftest import write
 

@@ -10,13 +10,13 @@ import pytest
 from mcap.records import Schema
 
 from quadriga.recordings.metadata import build_metadata
+from quadriga.shared import messages as msg
+from quadriga.shared.codec import encode
 from quadriga.shared.config.timing import periods
 from quadriga.shared.errors import RecordingError
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import Recording, check_schema
 from quadriga.shared.recording.writer import RecordingWriter
-from quadriga.shared.wire import messages as msg
-from quadriga.shared.wire.codec import encode
 from tests.quadriga.commands.conftest import CONFIG, RunCommand
 from tests.quadriga.conftest import write
 

@@ -15,7 +15,7 @@ from quadriga.commands.config_options import KEYS, UNCONFIGURED, read_config
 from quadriga.commands.parser import build_parser, main
 from quadriga.shared.config.load import load
 
-BRIDGED = ("--set", "team.plant=robots", "--set", "team.plants=each")
+BRIDGED = ("--set", "team.plant=robots", "--set", "team.plant_per_robot=true")
 
 
 def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
@@ -39,22 +39,25 @@ def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, 
         (["sim", "--config", "/nowhere/team.toml"], "/nowhere/team.toml: got No such file"),
         (["sim", "--hung"], "--hung: got no --as, expected --as with a kind of robot"),
         (["sim", "--as", "a1", "--truth", "/nowhere/t.csv"], "/nowhere/t.csv: got No such file"),
-        (["sim", "--robot", "r1"], "--robot: got 'r1', expected nothing (team.plants is 'one')"),
         (
-            ["sim", "--yokes", "none", "--set", "team.plants=each"],
-            "--robot: got '', expected one of r1, r2, r3 (team.plants is 'each')",
+            ["sim", "--robot", "r1"],
+            "--robot: got 'r1', expected nothing (team.plant_per_robot is false)",
+        ),
+        (
+            ["sim", "--yokes", "none", "--set", "team.plant_per_robot=true"],
+            "--robot: got '', expected one of r1, r2, r3 (team.plant_per_robot is true)",
         ),
         (
             ["sim", "--set", "team.plant=mujoko"],
             "team.plant: got 'mujoko', expected one of mujoco, robots (did you mean 'mujoco'?)",
         ),
         (["walk", "--set", "team.plant=mujoko"], "team.plant: got 'mujoko'"),
-        (["walk", "--controller", "python no.py"], "team.controller: got no file 'no.py'"),
+        (["walk", "--controller", "python no.py"], "team.agent_command: got no file 'no.py'"),
         (
             ["walk", "--controller", "wlak", "--planner", "deepc"],
-            "planner.kind: got 'deepc' with team.controller 'wlak', expected 'none'",
+            "planner.kind: got 'deepc' with team.agent_command 'wlak', expected 'none'",
         ),
-        (["agent", "--robot", "r1", "--controller", "wlak"], "team.controller: got 'wlak': No "),
+        (["agent", "--robot", "r1", "--controller", "wlak"], "team.agent_command: got 'wlak': No "),
         (["agent", "--robot", "r4"], "--robot: got 'r4', expected one of r1, r2, r3"),
         (
             ["agent", "--robot", "r1", "--connect", "tcp/x:1", "--endpoint", "tcp/y:1"],
@@ -271,10 +274,10 @@ def test_the_configuration_in_force_can_be_printed_and_read_back(
 
 def test_options_win_over_the_file(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     path = tmp_path / "team.toml"
-    path.write_text("[world]\nseed = 3\nseconds = 9.0\n", encoding="utf-8")
+    path.write_text("[world]\nseed = 3\nduration = 9.0\n", encoding="utf-8")
     _, out, _ = run(capsys, "config", "--config", str(path), "--seed", "4", "--vx", "-0.2")
     assert "seed = 4\n" in out
-    assert "seconds = 9.0\n" in out
+    assert "duration = 9.0\n" in out
     assert "vx = -0.2\n" in out
 
 

@@ -12,13 +12,13 @@ import pytest
 from quadriga.commands.config_options import read_config
 from quadriga.commands.parser import build_parser, main
 from quadriga.shared.bus.session import Bus
+from quadriga.shared.codec import encode
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import SIM
+from quadriga.shared.messages import Clock
 from quadriga.shared.runtime.process_use import read_use
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.messages import Clock
-from quadriga.shared.wire.topics import CLOCK
+from quadriga.shared.topics import CLOCK
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.registry import team_registered
 from quadriga.team.running_team import RunningTeam, to_json

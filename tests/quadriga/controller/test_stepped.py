@@ -13,10 +13,10 @@ from quadriga.controller import Command, Reference, State, build_command
 from quadriga.controller.stepped import ControllerMemory, SteppedController
 from quadriga.shared.config.load import load
 from quadriga.shared.errors import ProcessError
-from quadriga.shared.wire.messages import EStop, Reset, Resume, SafeStop
+from quadriga.shared.messages import EStop, Reset, Resume, SafeStop
 from tests.a1 import standing
 
-CONFIG = load(None, {"team.robots": 1, "team.controller": "walk", "gait.stand_ms": 100})
+CONFIG = load(None, {"team.robots": 1, "team.agent_command": "walk", "gait.stand_ms": 100})
 
 
 class Walk:

@@ -13,7 +13,7 @@ from quadriga.shared.errors import ConfigError
 
 
 def test_robot_and_configuration_are_told(tmp_path: Path) -> None:
-    config = load(None, {"team.robots": 2, "team.controller": "walk"})
+    config = load(None, {"team.robots": 2, "team.agent_command": "walk"})
     file = tmp_path / "config.toml"
     file.write_text(to_toml(config), encoding="utf-8")
     task = read_task({"QUADRIGA_ROBOT": "r2", "QUADRIGA_CONFIG": str(file)})

@@ -65,7 +65,7 @@ def cells(table: Table, name: str) -> dict[str, str]:
     )
 
 
-ON = "time-over: end of world.seconds; late ticks: r1 5"
+ON = "time-over: end of world.duration; late ticks: r1 5"
 OUTCOMES = (
     ("walked on", {"end": ON, "said": {"r1": ["walking", "lying-down"]}, "rest_ms": {"r1": 8000}}),
     ("lay down", {"end": "none", "said": {"r1": ["lying-down"]}, "rest_ms": {"r1": 3000}}),

@@ -9,7 +9,7 @@ import pytest
 
 from quadriga.desk.outcome import describe_walk, read_truth, time_kept, time_to_rest, traces_of
 from quadriga.desk.robots import Said
-from quadriga.shared.wire.messages import Truth
+from quadriga.shared.messages import Truth
 from quadriga.sim_server.emulator.process import LOST, TRUTH_COLUMNS, truth_row
 
 NAMES = ("r1", "r2")

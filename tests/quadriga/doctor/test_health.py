@@ -7,9 +7,9 @@ from dataclasses import replace
 import pytest
 
 from quadriga.doctor.health import judge_team
+from quadriga.shared.about import HERE, REFUSED, WARMING_UP
 from quadriga.shared.bus.diagnostics import TeamView
 from quadriga.shared.members import team_members
-from quadriga.shared.wire.about import HERE, REFUSED, WARMING_UP
 from tests.shared.bus.abouts import NAMES, SIM, about, answer, view
 
 TEAM = [m for m in team_members(("r1", "r2"), central=False, recorded=False) if m.name in NAMES]

@@ -114,7 +114,7 @@ def test_what_cannot_be_read_is_unknown() -> None:
 
 
 def test_a_team_at_a_loopback_address_runs_here_as_a_whole() -> None:
-    config = load(None, {"team.robots": 5, "world.seconds": 10.0, "world.mode": "realtime"})
+    config = load(None, {"team.robots": 5, "world.duration": 10.0, "world.mode": "realtime"})
     whole, part = need_of(config, spread=False), need_of(config, spread=True)
     assert (whole.busy, whole.count, whole.realtime) == (6, 8, True)
     assert (part.busy, part.count) == (2, 2)

@@ -8,11 +8,11 @@ import re
 from quadriga.doctor import certificates, machine, packages, trust
 from quadriga.doctor.examine import LINK
 from quadriga.doctor.report import DoctorReport, MemberReport, format_report, to_json
+from quadriga.shared.about import REFUSED as NOT_GRANTED
 from quadriga.shared.bus import diagnostics
 from quadriga.shared.bus.diagnostics import BAD, GOOD, NOTE, UNKNOWN, Diagnosis
 from quadriga.shared.members import OPERATOR, RECORDER, ROUTER, SIM
 from quadriga.shared.runtime.places import SOURCE
-from quadriga.shared.wire.about import REFUSED as NOT_GRANTED
 from tests.shared.bus.abouts import about, answer
 
 DOC = (SOURCE / "docs" / "doctor.md").read_text(encoding="utf-8")

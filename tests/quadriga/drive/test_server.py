@@ -29,15 +29,15 @@ from quadriga.drive.controls import DriveControls
 from quadriga.drive.driver_words import DriverWord
 from quadriga.drive.server import DriveServer
 from quadriga.shared.bus.session import HERE, Bus
+from quadriga.shared.codec import decode, encode
+from quadriga.shared.codes import ESTOPPED
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError
 from quadriga.shared.members import OPERATOR, SIM
+from quadriga.shared.messages import EStop, Event, Reset, Resume, SafeStop, Status
 from quadriga.shared.runtime.clock import monotonic, sleep
-from quadriga.shared.wire.codec import decode, encode
-from quadriga.shared.wire.codes import ESTOPPED
-from quadriga.shared.wire.messages import EStop, Event, Reset, Resume, SafeStop, Status
-from quadriga.shared.wire.topics import ESTOP, EVENT, RESET, RESUME, STATUS, STOP
+from quadriga.shared.topics import ESTOP, EVENT, RESET, RESUME, STATUS, STOP
 from quadriga.team.endpoint import free_endpoint
 
 WAIT = 10.0  # s

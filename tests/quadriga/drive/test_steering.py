@@ -8,7 +8,7 @@ import pytest
 from quadriga.drive.charge import InCharge
 from quadriga.drive.steering import GO_ON, STOP, LastWord, steer
 from quadriga.drive.wish import Wish
-from quadriga.shared.wire.messages import Status
+from quadriga.shared.messages import Status
 
 AHEAD = Wish(0.4, 0.0, 0.0, 0.26)
 DRIVES = InCharge("page 1", 1000, AHEAD, held=True)

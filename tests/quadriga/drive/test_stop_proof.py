@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from quadriga.drive.stop_proof import unconfirmed
-from quadriga.shared.wire.codes import ESTOPPED, FALL, ROBOT_STOPPED
-from quadriga.shared.wire.messages import Event, Status
+from quadriga.shared.codes import ESTOPPED, FALL, ROBOT_STOPPED
+from quadriga.shared.messages import Event, Status
 
 ROBOTS = ("r1", "r2")
 

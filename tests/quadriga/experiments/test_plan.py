@@ -14,7 +14,7 @@ from quadriga.experiments.sweep import parse_sweep
 from quadriga.experiments.variants import parse_variants
 from quadriga.shared.errors import ConfigError
 
-SCENARIO = '[team]\nrobots = 2\n\n[world]\nterrain = "boxes"\nseconds = 8.0\nfriction = 0.7\n'
+SCENARIO = '[team]\nrobots = 2\n\n[world]\nterrain = "boxes"\nduration = 8.0\nfriction = 0.7\n'
 
 
 @pytest.fixture
@@ -70,13 +70,13 @@ def test_all_variants_walk_some_seeds_before_one_walks_them_all(scenario: str) -
 
 def test_later_values_of_a_key_win(scenario: str, tmp_path: Path) -> None:
     file = tmp_path / "mine.toml"
-    file.write_text("[world]\nseconds = 5.0\n[reference]\nvx = 0.3\n", encoding="utf-8")
+    file.write_text("[world]\nduration = 5.0\n[reference]\nvx = 0.3\n", encoding="utf-8")
     variants = parse_variants(["plain:controller.preset=plain", "none"], None)
     plan = build_plan([scenario], variants, (), (0,), "plain", file, {"world.friction": 0.6})
     config = plan.configs[Group("steps", "plain", ())]
     assert config.team.robots == 2
     assert config.world.terrain == "boxes", "the scenario's"
-    assert config.world.seconds == 5.0, "the file's, not the scenario's"
+    assert config.world.duration == 5.0, "the file's, not the scenario's"
     assert config.reference.vx == 0.3, "the file's"
     assert config.world.friction == 0.6, "the option's"
     assert config.controller.kp_tilt == 400.0, "the preset's"
@@ -109,8 +109,8 @@ def test_a_preset_replaces_what_was_said_before_it_and_not_what_is_said_with_it(
         (
             "none",
             [],
-            {"team__plants": "each", "team__yokes": "none"},
-            "team.plant, team.plants: got 'mujoco', 'each', expected 'mujoco', 'one'",
+            {"team__plant_per_robot": True, "team__yokes": "none"},
+            "team.plant, team.plant_per_robot: got 'mujoco', true, expected 'mujoco', false",
         ),
         ("none", ["world.payload_on=team,r7"], {"world__payload": 2.0}, "r7"),
         ("later:world.seed=3", [], {}, "variant later: world.seed"),

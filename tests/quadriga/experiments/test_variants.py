@@ -111,8 +111,8 @@ def test_parts_are_split_at_marks_outside_of_brackets_alone(parts: list[str]) ->
 
 
 def test_a_controller_of_ones_own_has_no_predictor() -> None:
-    mine = "mine:team.controller=python walk.py --fast"
+    mine = "mine:team.agent_command=python walk.py --fast"
     variants = parse_variants([f"damped,{mine}"], None)
-    assert dict(variants[1].keys) == {"team.controller": "python walk.py --fast"}
+    assert dict(variants[1].keys) == {"team.agent_command": "python walk.py --fast"}
     found = combine_with_predictors(variants, ("pinv",))
     assert [variant.name for variant in found] == ["damped+pinv", "mine"]

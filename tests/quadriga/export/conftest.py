@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from quadriga.shared.wire.messages import Event, Plan, Status
+from quadriga.shared.messages import Event, Plan, Status
 from tests.quadriga.conftest import run_config, write
 
 SECONDS = 0.8

@@ -11,11 +11,11 @@ import pyarrow.parquet as pq
 import pytest
 
 from quadriga.commands.parser import main
+from quadriga.shared.codec import decode
 from quadriga.shared.errors import MessageError
+from quadriga.shared.messages import Message, Plan, State, Status, Truth
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.messages import Message, Plan, State, Status, Truth
-from quadriga.shared.wire.topics import topic_of
+from quadriga.shared.topics import topic_of
 from tests.quadriga.export.conftest import FALL, PLAN, STATUS
 
 Sent = dict[str, list[Message]]

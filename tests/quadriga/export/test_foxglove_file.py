@@ -19,14 +19,14 @@ from mcap_protobuf.decoder import DecoderFactory
 from quadriga.commands.parser import main
 from quadriga.export import team_scene
 from quadriga.pictures.meshes import link_meshes
+from quadriga.shared.codec import decode
 from quadriga.shared.config.sections import WorldConfig
 from quadriga.shared.errors import MeshError, MessageError
+from quadriga.shared.messages import Measurement, Plan, Reference, State, Truth
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.a1 import A1
-from quadriga.shared.robot.colours import robot_rgb
-from quadriga.shared.robot.conventions import FOOT_FRAMES, Array
-from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.messages import Measurement, Plan, Reference, State, Truth
+from quadriga.shared.robots.a1 import A1
+from quadriga.shared.robots.colours import robot_rgb
+from quadriga.shared.robots.conventions import FOOT_FRAMES, Array
 from quadriga.sim_server.world.team_model import build_team_model
 from tests.a1 import build_pinocchio_model
 from tests.quadriga.conftest import ESTIMATOR_ERROR, WriteRun, outputs, run_config
@@ -226,7 +226,7 @@ def test_events_are_log_lines(topics: Topics) -> None:
 
 @pytest.mark.parametrize("terrain", ["boxes", "heightfield"])
 def test_terrain_lies_at_its_height(write_run: WriteRun, tmp_path: Path, terrain: str) -> None:
-    world = WorldConfig(seconds=0.5, seed=7, terrain=terrain)
+    world = WorldConfig(duration=0.5, seed=7, terrain=terrain)
     config = replace(run_config(2, 0.5), world=world)
     folder = write_run(config)
     out = tmp_path / "out.mcap"
@@ -244,7 +244,7 @@ def test_terrain_lies_at_its_height(write_run: WriteRun, tmp_path: Path, terrain
 
 
 def test_loose_stones_are_no_part_of_the_scene(write_run: WriteRun, tmp_path: Path) -> None:
-    world = WorldConfig(seconds=0.5, terrain="pebbles", terrain_height=0.02)
+    world = WorldConfig(duration=0.5, terrain="pebbles", terrain_height=0.02)
     folder = write_run(replace(run_config(2, 0.5), world=world))
     out = tmp_path / "out.mcap"
     assert main(["export", str(folder / "run.mcap"), "--to", "foxglove", "-o", str(out)]) == 0

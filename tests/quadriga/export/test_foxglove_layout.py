@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from quadriga.commands.parser import main
-from quadriga.shared.robot.colours import robot_colour
+from quadriga.shared.robots.colours import robot_colour
 from tests.quadriga.conftest import WriteRun, run_config
 from tests.quadriga.export.test_foxglove_file import Topics, read
 

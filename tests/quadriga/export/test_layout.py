@@ -11,8 +11,8 @@ import pytest
 from quadriga.export.layout import build_layout
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
-from quadriga.shared.wire.messages import Measurement, Plan, State, Status, Truth
-from quadriga.shared.wire.topics import TABLE, Topic
+from quadriga.shared.messages import Measurement, Plan, State, Status, Truth
+from quadriga.shared.topics import TABLE, Topic
 
 
 @pytest.mark.parametrize("topic", TABLE, ids=lambda topic: topic.name)

@@ -14,11 +14,11 @@ import pytest
 
 from quadriga.commands.parser import main
 from quadriga.pictures.meshes import link_meshes
+from quadriga.shared.messages import Plan, Truth
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.a1 import A1
-from quadriga.shared.robot.colours import robot_colour
-from quadriga.shared.robot.conventions import OUTPUTS, Array
-from quadriga.shared.wire.messages import Plan, Truth
+from quadriga.shared.robots.a1 import A1
+from quadriga.shared.robots.colours import robot_colour
+from quadriga.shared.robots.conventions import OUTPUTS, Array
 from tests.quadriga.conftest import ESTIMATOR_ERROR, WriteRun, outputs, run_config
 from tests.quadriga.export.conftest import PLAN
 

@@ -14,10 +14,10 @@ from quadriga.export.columns import TickReached
 from quadriga.export.run import FORMATS
 from quadriga.export.source import Source
 from quadriga.recordings.metadata import build_metadata
+from quadriga.shared.codec import encode
 from quadriga.shared.config.sections import Config
+from quadriga.shared.messages import Event
 from quadriga.shared.recording.writer import RecordingWriter
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.messages import Event
 
 SMALL = """
 import resource, signal, sys

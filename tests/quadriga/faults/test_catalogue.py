@@ -12,7 +12,7 @@ from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.members import OPERATOR
-from quadriga.shared.robot.robots import ROBOTS
+from quadriga.shared.robots.registry import ROBOTS
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.sim_server.world.faults import build_components, parse_faults
 from quadriga.team.launch import Launch, ProcessSpec, process_table

@@ -54,9 +54,9 @@ def test_what_stops_by_itself_may_last_as_long_as_somebody_says(text: str) -> No
 
 
 def test_a_walk_is_longer_by_how_long_its_fault_lasts(tmp_path: Path) -> None:
-    draw, config = Draw("r2", 4000, 1, chosen=True), load(None, {"world.seconds": 5.0})
+    draw, config = Draw("r2", 4000, 1, chosen=True), load(None, {"world.duration": 5.0})
     with find_fault("r2/agent paused 4 1.5", config).stage(config, draw, tmp_path) as stage:
-        assert stage.config.world.seconds == 6.5
+        assert stage.config.world.duration == 6.5
         assert (stage.robot, stage.detail, stage.lasts) == ("r2", "for 1.5 s", 0.0)
 
 

@@ -11,15 +11,15 @@ import pytest
 from quadriga.faults.outcome import Moment, describe_outcome, moment_at, tick_at
 from quadriga.recordings.events import read_events
 from quadriga.recordings.traces import read_traces
+from quadriga.shared import codes
+from quadriga.shared.messages import Event, Message, State, Status
 from quadriga.shared.recording.metadata import END
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.wire import codes
-from quadriga.shared.wire.messages import Event, Message, State, Status
 from tests.quadriga.conftest import WALL, WALL_0, WriteRun, run_config
 
 FAULT = 1000  # tick
 CONFIG = run_config(robots=3, seconds=3.0)
-ENDS = [("team/sim/event", Event.of(3000, codes.TIME_OVER, "", "end of world.seconds"))]
+ENDS = [("team/sim/event", Event.of(3000, codes.TIME_OVER, "", "end of world.duration"))]
 
 
 def outcome(folder: Path, moment: Moment) -> dict[str, Any]:
@@ -173,13 +173,13 @@ def test_what_the_recording_lacks_the_world_has_told(write_run: WriteRun) -> Non
         Event.of(FAULT + 22, codes.GONE, "r2", "gone"),
         Event.of(FAULT + 210, codes.LOWERED, "r2", "no command"),
         Event.of(FAULT + 900, codes.FALL, "r3", "tilt"),
-        Event.of(FAULT + 4000, codes.TIME_OVER, "", "end of world.seconds"),
+        Event.of(FAULT + 4000, codes.TIME_OVER, "", "end of world.duration"),
     ]
     recording = Recording(write_run(CONFIG) / "run.mcap")
     moment = Moment("r2", FAULT)
     row = describe_outcome(CONFIG, read_traces(recording), recording, moment, told)
     assert (row["detect_ms"], row["falls"], row["lowered"]) == (22, ["r3"], ["r2"])
-    assert row["end"] == "time-over: end of world.seconds"
+    assert row["end"] == "time-over: end of world.duration"
     assert row["recover_ms"] is None  # what the robots did then nobody has recorded
 
 

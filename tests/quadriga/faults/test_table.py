@@ -32,7 +32,7 @@ def row(**fields: Any) -> dict[str, Any]:
         "recover_ms": 0,
         "lost_messages": 0,
         "status": WALKS,
-        "end": "time-over: end of world.seconds",
+        "end": "time-over: end of world.duration",
     } | fields
 
 

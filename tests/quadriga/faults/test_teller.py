@@ -8,15 +8,15 @@ import pytest
 
 from quadriga.faults.fault import Stage
 from quadriga.faults.teller import FaultTeller
+from quadriga.shared import codes
 from quadriga.shared.bus.session import HERE, Bus
+from quadriga.shared.codec import decode, encode
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import LAUNCHER, RECORDER, SIM
+from quadriga.shared.messages import Clock, Event
 from quadriga.shared.runtime.clock import monotonic, sleep
-from quadriga.shared.wire import codes
-from quadriga.shared.wire.codec import decode, encode
-from quadriga.shared.wire.messages import Clock, Event
-from quadriga.shared.wire.topics import CLOCK, INJECTED
+from quadriga.shared.topics import CLOCK, INJECTED
 from quadriga.team.endpoint import free_endpoint
 
 WAIT = 10.0  # s

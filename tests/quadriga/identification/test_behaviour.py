@@ -19,7 +19,7 @@ from quadriga.identification import behaviour as module
 from quadriga.identification import sample_fits
 from quadriga.identification.behaviour import behaviour, digest_of, numbers
 from quadriga.shared.errors import QuadrigaError
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 
 # A short walk of one robot: machine code for each copy of the package would take a minute.
 SHORT = """

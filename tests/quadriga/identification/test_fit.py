@@ -32,7 +32,7 @@ from quadriga.identification.fit_report import (
     report_fit,
 )
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robot.conventions import OUTPUTS
+from quadriga.shared.robots.conventions import OUTPUTS
 from tests.quadriga.linear_data import arguments, config_of, dataset, put_data
 
 Said = pytest.CaptureFixture[str]

@@ -9,12 +9,12 @@ import pytest
 
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.identification.rollout import Rollout, build_agents
+from quadriga.shared.codec import encode
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.messages import Message, Reference
+from quadriga.shared.messages import Message, Reference
+from quadriga.shared.robots.conventions import Array
 from tests.a1 import STAND_HEIGHT
 from tests.agents.duet import simple_predictor
 from tests.sim_server.standing import SILENT
@@ -131,6 +131,6 @@ def test_excitation_reaches_the_robot_it_is_meant_for() -> None:
 
 
 def test_a_controller_of_ones_own_does_not_walk_in_this_process() -> None:
-    config = load(None, {"team.robots": 1, "team.controller": "walk"})
+    config = load(None, {"team.robots": 1, "team.agent_command": "walk"})
     with pytest.raises(ConfigError, match=r"team\.controller: got 'walk', expected '': agents"):
         build_agents(config, None)

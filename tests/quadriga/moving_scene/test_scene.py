@@ -18,7 +18,7 @@ from quadriga.pictures.meshes import link_meshes
 from quadriga.report.page import build_page
 from quadriga.report.run import read_run
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from quadriga.view.compose import compose
 from quadriga.view.mesh_groups import group_meshes
 from quadriga.view.recorded import RecordedRun

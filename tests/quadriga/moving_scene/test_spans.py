@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from quadriga.moving_scene.spans import Span, choose_spans
 from quadriga.report.timeline import TimelineEntry
-from quadriga.shared.wire.codes import FALL
+from quadriga.shared.codes import FALL
 
 
 def entry(tick: int, robot: str, kind: str = FALL) -> TimelineEntry:

@@ -20,8 +20,8 @@ from quadriga.pictures.link_mesh import LinkMesh, LinkMeshes
 from quadriga.pictures.meshes import link_meshes
 from quadriga.pictures.urdf_visuals import mesh_visuals
 from quadriga.shared.errors import MeshError
-from quadriga.shared.robot.conventions import Array, Leg
-from quadriga.shared.robot.robots import ROBOTS
+from quadriga.shared.robots.conventions import Array, Leg
+from quadriga.shared.robots.registry import ROBOTS
 from quadriga.shared.runtime.places import cache_files
 
 PARTS = ("hip", "thigh", "calf")

@@ -16,11 +16,11 @@ from quadriga.pictures.frames import FRAME, clip_ticks, sheet_ticks
 from quadriga.pictures.poses import PosedTeam, read_poses, truth_ticks
 from quadriga.pictures.render import render
 from quadriga.pictures.viewpoint import viewpoints
+from quadriga.shared import messages as msg
 from quadriga.shared.errors import RecordingError
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.a1 import A1
-from quadriga.shared.robot.colours import robot_rgb
-from quadriga.shared.wire import messages as msg
+from quadriga.shared.robots.a1 import A1
+from quadriga.shared.robots.colours import robot_rgb
 from quadriga.sim_server.world.layout import NQ
 from tests.a1 import FOOT_RADIUS, q_stand
 from tests.quadriga.conftest import SPEED, WriteRun, run_config

@@ -9,7 +9,7 @@ import numpy as np
 
 from quadriga.pictures.meshes import link_meshes
 from quadriga.pictures.robot_shapes import dress
-from quadriga.shared.robot.a1 import A1
+from quadriga.shared.robots.a1 import A1
 from quadriga.sim_server.world.team_model import build_team_model
 from tests.quadriga.conftest import run_config
 

@@ -12,7 +12,7 @@ from PIL import Image
 from quadriga.pictures.frames import FRAME
 from quadriga.pictures.name_tags import write_names
 from quadriga.pictures.viewpoint import AZIMUTH, ELEVATION, FIELD, Viewpoint
-from quadriga.shared.robot.colours import robot_rgb
+from quadriga.shared.robots.colours import robot_rgb
 
 VIEW = Viewpoint(np.array([0.5, -0.2, 0.15]), 2.2)
 

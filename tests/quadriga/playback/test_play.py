@@ -16,12 +16,12 @@ import pytest
 from quadriga.commands.parser import main
 from quadriga.playback.timeline import Timeline, parse_remap, rename
 from quadriga.shared.bus.session import HERE, Bus, Packet
+from quadriga.shared.codec import envelope
 from quadriga.shared.config.sections import BusConfig
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.members import SIM
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.runtime.clock import monotonic
-from quadriga.shared.wire.codec import envelope
 from quadriga.team.endpoint import free_endpoint
 from tests.listening import WAIT
 from tests.quadriga.lockstep_run import TICKS, config, write_lockstep

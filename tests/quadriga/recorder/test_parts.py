@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from quadriga.recorder.parts import Limits, Parts
+from quadriga.shared.codec import encode
 from quadriga.shared.recording.metadata import LOST
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.wire.codec import encode
 from tests.manual_clock import ManualClock
 from tests.shared.recording.test_reader import METADATA, state
 

@@ -12,15 +12,15 @@ from pathlib import Path
 import pytest
 
 from quadriga.shared.bus.session import HERE, READY, Bus
+from quadriga.shared.codec import encode
 from quadriga.shared.config.sections import BusConfig, Config, TeamConfig
 from quadriga.shared.config.write import config_sha256, to_toml
 from quadriga.shared.members import OPERATOR, SIM
+from quadriga.shared.messages import EStop
 from quadriga.shared.recording.metadata import COUNTS
 from quadriga.shared.recording.quota import MAX_FOREIGN_KEYS, OVERSIZED, REFUSED
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.runtime.clock import wall_ns
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.messages import EStop
 from quadriga.team.endpoint import free_endpoint
 from tests.listening import WAIT, await_listener, await_recorded
 

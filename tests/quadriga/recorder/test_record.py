@@ -19,14 +19,14 @@ from mcap.reader import make_reader
 from quadriga.commands.parser import main
 from quadriga.recordings.survey import survey
 from quadriga.shared.bus.session import HERE, READY, Bus
+from quadriga.shared.codec import encode
 from quadriga.shared.config.sections import BusConfig, Config, RecorderConfig, TeamConfig
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.members import RECORDER, SIM
+from quadriga.shared.messages import Command, Consumed, Plan, Reference
 from quadriga.shared.recording.metadata import LOST, SINCE
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.messages import Command, Consumed, Plan, Reference
 from quadriga.team.endpoint import free_endpoint
 from tests.listening import WAIT, await_listener, await_recorded
 from tests.shared.recording.test_reader import state

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from quadriga.recorder.selection import KeyFilter, Selection, own_keys
 from quadriga.shared.recording.quota import MAX_FOREIGN_KEYS
-from quadriga.shared.wire.topics import CLOCK
+from quadriga.shared.topics import CLOCK
 
 
 def test_what_the_table_does_not_have_recorded_is_recorded_if_asked_for() -> None:

@@ -15,6 +15,8 @@ from quadriga.recordings.check import check, format_findings
 from quadriga.recordings.checks.finding import CheckedMessage, Finding
 from quadriga.recordings.checks.sequence import Order
 from quadriga.recordings.summary import summarise
+from quadriga.shared import messages as msg
+from quadriga.shared.codec import encode
 from quadriga.shared.config.sections import (
     Config,
     IdentificationConfig,
@@ -24,8 +26,6 @@ from quadriga.shared.config.sections import (
 )
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.recording.writer import RecordingWriter
-from quadriga.shared.wire import messages as msg
-from quadriga.shared.wire.codec import encode
 from tests.plugins.kinds import install_kind
 from tests.quadriga.conftest import WriteRun, run_config, write
 
@@ -172,13 +172,13 @@ def test_every_broken_rule_is_found_at_its_message(
     assert any(first.got in line and "FAIL" not in line for line in format_findings(findings))
 
 
-@pytest.mark.parametrize("plants", ["one", "each"])
-def test_events_of_robots_with_plants_of_their_own_are_in_order_each(plants: str) -> None:
-    order = Order(replace(SHORT, team=replace(SHORT.team, plants=plants)))
+@pytest.mark.parametrize("own", [False, True])
+def test_events_of_robots_with_plants_of_their_own_are_in_order_each(own: bool) -> None:
+    order = Order(replace(SHORT, team=replace(SHORT.team, plant_per_robot=own)))
     for tick, robot in ((20, "r1"), (15, "r2"), (30, "r2")):
         event = msg.Event.of(tick, "bridge-mode", robot, "walking")
         order.look(CheckedMessage("team/sim/event", "", "sim/event", event))
-    assert order.finding.passed == (plants == "each")
+    assert order.finding.passed == own
     order.look(
         CheckedMessage(
             "team/sim/event", "", "sim/event", msg.Event.of(25, "bridge-mode", "r2", "stopped")

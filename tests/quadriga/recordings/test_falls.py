@@ -16,9 +16,9 @@ from quadriga.recordings.falls import find_falls
 from quadriga.recordings.summary import summary_of
 from quadriga.recordings.traces import Traces
 from quadriga.recordings.truth import build_truth_trace
+from quadriga.shared.codes import ESTOPPED, FALL, LOWERED, RESET
+from quadriga.shared.messages import Event
 from quadriga.shared.recording.metadata import LOST
-from quadriga.shared.wire.codes import ESTOPPED, FALL, LOWERED, RESET
-from quadriga.shared.wire.messages import Event
 from quadriga.sim_server.world.world import World
 from quadriga.team.run_summary import has_failed
 from tests.sim_server.standing import configured, stand

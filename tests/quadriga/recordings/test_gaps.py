@@ -7,18 +7,18 @@ import pytest
 
 from quadriga.agents.planner.acceptance import load_checked
 from quadriga.recordings.gaps import missing_ticks, repeated_ticks
+from quadriga.shared.codec import decode
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
+from quadriga.shared.messages import Measurement, Plan, Status
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.messages import Measurement, Plan, Status
 from tests.golden import scenario
 from tests.golden.rerun import rerun
 
 
 def configured(**keys: object) -> Config:
     given = {name.replace("__", "."): value for name, value in keys.items()}
-    return load(None, {"team.robots": 1, "world.seconds": 1.0, "gait.stand_ms": 100, **given})
+    return load(None, {"team.robots": 1, "world.duration": 1.0, "gait.stand_ms": 100, **given})
 
 
 def whole(truth_ms: int) -> dict[str, np.ndarray]:
@@ -46,7 +46,7 @@ def test_truth_is_expected_of_one_simulated_world_alone() -> None:
     ticks = whole(10)
     del ticks["team/sim/truth"]
     assert missing_ticks(configured(), ticks)["team/sim/truth"] == 99
-    for other in ({"team__plants": "each"}, {"team__plant": "puppet"}):
+    for other in ({"team__plant_per_robot": True}, {"team__plant": "puppet"}):
         assert "team/sim/truth" not in missing_ticks(configured(**other), ticks)
 
 
@@ -106,7 +106,7 @@ def test_a_tick_that_came_twice_has_a_second_publisher() -> None:
 def test_a_controller_of_ones_own_measures_nothing_for_others() -> None:
     ticks = {key: found for key, found in whole(10).items() if key.endswith(("command", "state"))}
     ticks["team/sim/truth"] = whole(10)["team/sim/truth"]
-    missing = missing_ticks(configured(team__controller="walk"), ticks)
+    missing = missing_ticks(configured(team__agent_command="walk"), ticks)
     assert missing == {"team/sim/truth": 0, "team/r1/state": 0, "team/r1/command": 0}
 
 

@@ -11,10 +11,10 @@ from collections.abc import Iterator
 import pytest
 
 from quadriga.shared.bus.session import HERE, Bus
+from quadriga.shared.codec import encode
 from quadriga.shared.config.sections import BusConfig, Config, TeamConfig
 from quadriga.shared.members import SIM
 from quadriga.shared.runtime.clock import monotonic, sleep
-from quadriga.shared.wire.codec import encode
 from quadriga.team.endpoint import free_endpoint
 from tests.listening import WAIT
 from tests.shared.recording.test_reader import state

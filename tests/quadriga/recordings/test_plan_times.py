@@ -12,7 +12,7 @@ from quadriga.recordings.summary import summarise
 from quadriga.recordings.traces import plan_times
 from quadriga.report.process_figures import list_times
 from quadriga.report.run import read_run
-from quadriga.shared.wire.messages import Message, Status
+from quadriga.shared.messages import Message, Status
 from tests.quadriga.conftest import WriteRun, run_config
 
 

@@ -9,10 +9,10 @@ import pytest
 
 from quadriga.recordings.stops import find_stops
 from quadriga.recordings.traces import Traces, read_traces
+from quadriga.shared import codes
+from quadriga.shared.messages import Event
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.wire import codes
-from quadriga.shared.wire.messages import Event
-from quadriga.shared.wire.topics import COMMAND
+from quadriga.shared.topics import COMMAND
 from quadriga.team.run_summary import has_failed
 
 
@@ -22,7 +22,7 @@ def traces(known_run: Path) -> Traces:
 
 
 def with_events(traces: Traces, *events: Event, controller: str = "walk") -> Traces:
-    team = replace(traces.config.team, controller=controller)
+    team = replace(traces.config.team, agent_command=controller)
     return replace(traces, config=replace(traces.config, team=team), events=events)
 
 

@@ -15,14 +15,14 @@ from rich.console import Console
 from quadriga.recordings.summary import summarise
 from quadriga.recordings.summary_table import print_summary
 from quadriga.recordings.traces import ERRORS
+from quadriga.shared import messages as msg
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config, PlannerConfig
 from quadriga.shared.config.write import config_sha256
 from quadriga.shared.errors import RecordingError
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.conventions import OUTPUTS
-from quadriga.shared.wire import messages as msg
+from quadriga.shared.robots.conventions import OUTPUTS
 from tests.quadriga.conftest import ESTIMATOR_ERROR, SPEED, WriteRun, run_config
 
 APPROX = 1e-9
@@ -352,7 +352,7 @@ def test_how_far_the_clocks_of_plants_of_their_own_were_off(write_run: WriteRun)
         ("team/plant_r2/status", status(1000, {"clock.offset": -0.5, "clock.error": 0.2})),
         ("team/plant_r2/status", status(2000, {"clock.offset": 0.7, "clock.error": 0.6})),
     ]
-    each = {"team.plants": "each", "team.yokes": "none", "world.mode": "realtime"}
+    each = {"team.plant_per_robot": True, "team.yokes": "none", "world.mode": "realtime"}
     summary = summarise(write_run(load(None, {"team.robots": 2, **each}), extra=extra))
     clocks = {robot: summary["realtime"][robot]["clock"] for robot in ("r1", "r2")}
     assert clocks == {"r1": None, "r2": {"offset_ms": 0.5, "error_ms": 0.2}}

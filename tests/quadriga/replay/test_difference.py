@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quadriga.replay.difference import find_difference
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.messages import Command, Plan, Truth
+from quadriga.shared.codec import encode
+from quadriga.shared.messages import Command, Plan, Truth
 
 COMMAND_0 = Command(7, 7_000_000, *(np.arange(12.0) + 20 * k for k in range(5)))
 PLAN_0 = Plan(40, 40, 1, np.zeros((3, 12)), np.zeros((3, 6)), "solved", {"r1": 0}, 0)

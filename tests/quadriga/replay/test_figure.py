@@ -11,7 +11,7 @@ from quadriga.charts.panels import DEGREES, Panel
 from quadriga.replay import figure
 from quadriga.replay.figure import Curves, draw
 from quadriga.shared.errors import RecordingError
-from quadriga.shared.wire.messages import Measurement
+from quadriga.shared.messages import Measurement
 
 
 def curves() -> Curves:

@@ -9,8 +9,8 @@ from quadriga.plant.late import damp_joints
 from quadriga.replay.agent_log import ALL_TOLD, AgentLog
 from quadriga.replay.comparison import Comparison, ReplayedStep
 from quadriga.replay.lives import first_tick, split_lives
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.messages import Command, Consumed
+from quadriga.shared.codec import encode
+from quadriga.shared.messages import Command, Consumed
 from tests.a1 import standing
 from tests.agents.lone_robot import ALONE
 

@@ -17,10 +17,10 @@ from quadriga.agents.inbox.intake_log import Intake, format_message_id, list_mes
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.replay.agent_log import AgentLog
 from quadriga.replay.recorded_inputs import RecordedInputs, StepInputs
+from quadriga.shared.codec import encode
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.messages import Measurement, Message, Plan, Reference
+from quadriga.shared.messages import Measurement, Message, Plan, Reference
 from tests.a1 import standing
 
 TICKS, STEP_MS, PATIENCE = 420, 40, 30

@@ -23,13 +23,13 @@ from quadriga.replay.saved_qp import SavedQp
 from quadriga.replay.saved_qp import load as load_qp
 from quadriga.replay.saved_qp import save as save_qp
 from quadriga.replay.team_replay import replay
+from quadriga.shared.codec import encode
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError, RecordingError
+from quadriga.shared.messages import Command, Reference
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.recording.writer import RecordingWriter
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.messages import Command, Reference
 from tests.a1 import standing
 from tests.plugins.kinds import install_module
 from tests.quadriga.replay.rewritten import rewritten
@@ -153,7 +153,7 @@ COUNTING = """
 from quadriga.agents.planning.interface import PlanningInterface, PlanningOutputs
 from quadriga.agents.planning.active_plan import PlanCheck
 from quadriga.shared.planner_kinds import PlannerKind
-from quadriga.shared.wire.messages import Plan
+from quadriga.shared.messages import Plan
 import numpy as np
 
 KIND = PlannerKind("counting", "t", "quadriga_counting_module:Counting", needs_predictor=False,

@@ -13,9 +13,9 @@ import pytest
 
 from quadriga.commands.parser import main
 from quadriga.recordings.by_tick import by_tick
+from quadriga.shared.codec import decode, encode
+from quadriga.shared.messages import Command, State, Truth
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.wire.codec import decode, encode
-from quadriga.shared.wire.messages import Command, State, Truth
 from tests.quadriga.lockstep_run import LATE, TICKS, Change, config, write_lockstep
 from tests.quadriga.replay.rewritten import rewritten
 
@@ -156,10 +156,10 @@ def test_what_is_not_lockstep_or_not_used_is_refused(
     status, output = resim(capsys, path)
     assert (status, output.count("\n")) == (2, 1)
     assert "got a walk in real time, expected one in lock-step" in output
-    own = config(team__plants="each", team__yokes="none")
+    own = config(team__plant_per_robot=True, team__yokes="none")
     status, output = resim(capsys, write_lockstep(tmp_path / "own.mcap", own))
     assert status == 2
-    assert "team.plants 'each', expected a walk in one simulated world" in output
+    assert "team.plant_per_robot true, expected a walk in one simulated world" in output
     assert main(["resim", str(whole), "--seed", "4"]) == 2
     assert "got --seed, expected an option that it has" in capsys.readouterr().err
     assert main(["resim", str(tmp_path / "none.mcap")]) == 2

@@ -17,9 +17,9 @@ from quadriga.report.process_figures import draw_time_histograms
 from quadriga.report.run import ReportedRun, read_run
 from quadriga.report.top_view import draw_top_view
 from quadriga.report.trunk_figures import draw_trajectory
-from quadriga.shared.robot.colours import robot_colour
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.wire import messages as msg
+from quadriga.shared import messages as msg
+from quadriga.shared.robots.colours import robot_colour
+from quadriga.shared.robots.conventions import Array
 from tests.quadriga.conftest import WriteRun, outputs, run_config
 
 FILES = ("trajectory.png", "forces.png", "top_view.png", "times.png")

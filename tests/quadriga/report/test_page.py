@@ -18,9 +18,9 @@ from quadriga.recordings.traces import MeasurementTrace
 from quadriga.recordings.truth import TruthTrace
 from quadriga.report.page import build_page, write_page
 from quadriga.report.run import ReportedRun, read_run
+from quadriga.shared import messages as msg
 from quadriga.shared.errors import RecordingError
 from quadriga.shared.recording.writer import RecordingWriter
-from quadriga.shared.wire import messages as msg
 from tests.quadriga.conftest import Packet, WriteRun, run_config
 from tests.quadriga.report.outline import Outline
 

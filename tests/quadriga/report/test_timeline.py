@@ -8,7 +8,7 @@ from quadriga.report.about import list_changed_keys
 from quadriga.report.run import read_run
 from quadriga.report.timeline import TimelineEntry
 from quadriga.shared.config.load import load
-from quadriga.shared.wire.messages import Command, Message, Plan, State, Status
+from quadriga.shared.messages import Command, Message, Plan, State, Status
 from tests.quadriga.conftest import Change, WriteRun, run_config
 
 CONFIG = run_config(1, 1.2)

@@ -13,8 +13,8 @@ import pytest
 from quadriga.report.conditions import COLUMNS
 from quadriga.report.run import read_run
 from quadriga.report.troubles import Sign, Trouble, find_troubles
-from quadriga.shared.wire import messages as msg
-from quadriga.shared.wire.messages import Command, Message, Plan, State, Status, Truth
+from quadriga.shared import messages as msg
+from quadriga.shared.messages import Command, Message, Plan, State, Status, Truth
 from tests.a1 import TORQUE_LIMIT
 from tests.quadriga.conftest import Change, WriteRun, run_config
 from tests.quadriga.report.test_page import fallen

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from quadriga.shared.codec import encode
+from quadriga.shared.codes import FALL
 from quadriga.shared.config.load import load
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.codes import FALL
-from quadriga.shared.wire.messages import Clock, Event, Message, Status
+from quadriga.shared.messages import Clock, Event, Message, Status
 from quadriga.status.gather import StatusFold
 from quadriga.status.record import Costs
 

@@ -74,5 +74,5 @@ def test_who_is_not_well_is_named() -> None:
 
 
 def test_a_controller_of_ones_own_need_not_say_how_it_is() -> None:
-    config = load(None, {"team.robots": 2, "team.controller": "walk"})
+    config = load(None, {"team.robots": 2, "team.agent_command": "walk"})
     assert find_problems(config, True, replace(READING, accounts={}), MEMBERS) == ()

@@ -16,11 +16,11 @@ from quadriga.commands.parser import main
 from quadriga.shared.bus.membership import processes
 from quadriga.shared.bus.process_info import ProcessInfo
 from quadriga.shared.bus.session import HERE, READY, Bus
+from quadriga.shared.codec import encode
+from quadriga.shared.codes import PUSH
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.codes import PUSH
-from quadriga.shared.wire.messages import Clock, Event, Status
+from quadriga.shared.messages import Clock, Event, Status
 from quadriga.status import listen
 from quadriga.status.listen import listening
 from quadriga.team.endpoint import free_endpoint

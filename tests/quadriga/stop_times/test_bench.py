@@ -20,7 +20,7 @@ def test_what_cannot_be_is_said_in_a_line(capsys: pytest.CaptureFixture[str]) ->
     for words, got in (
         (("whistle",), "way: got 'whistle'"),
         (("--tries", "0"), "--tries: got 0"),
-        (("--set", "team.plants=each", "--yokes", "none"), "team.plant"),
+        (("--set", "team.plant_per_robot=true", "--yokes", "none"), "team.plant"),
     ):
         assert main(["bench-stop", *words]) == 2
         assert got in capsys.readouterr().err

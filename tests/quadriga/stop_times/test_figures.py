@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from quadriga.shared.wire import codes
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.messages import Event, Message, Status
-from quadriga.shared.wire.topics import EVENT
+from quadriga.shared import codes
+from quadriga.shared.codec import encode
+from quadriga.shared.messages import Event, Message, Status
+from quadriga.shared.topics import EVENT
 from quadriga.stop_times.figures import StopPress, build_stop_table, find_stops, sum_up
 from quadriga.stop_times.page import PAGE, renewed, stop_table
 

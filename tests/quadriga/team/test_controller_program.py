@@ -21,7 +21,7 @@ from quadriga.team.controller_program import become_controller, check_controller
 )
 def test_what_cannot_be_started_is_told_at_once(line: str, message: str) -> None:
     with pytest.raises(ConfigError, match=r"^team\.controller: ") as error:
-        check_controller(load(None, {"team.controller": line}))
+        check_controller(load(None, {"team.agent_command": line}))
     assert message in str(error.value)
 
 
@@ -29,11 +29,11 @@ def test_what_can_be_started_passes(tmp_path: Path) -> None:
     script = tmp_path / "walk.py"
     script.touch()
     for line in ("", f"python {script}", "python -m walk", "sh -c true"):
-        check_controller(load(None, {"team.controller": line}))
+        check_controller(load(None, {"team.agent_command": line}))
 
 
 def test_every_place_is_told(tmp_path: Path) -> None:
-    config = load(None, {"team.name": "lab", "team.controller": "walk"})
+    config = load(None, {"team.name": "lab", "team.agent_command": "walk"})
     places = places_of(config, "r2", tmp_path / "config.toml")
     assert tuple(places) == PLACES
     assert (places["robot"], places["team"], places["mode"]) == ("r2", "lab", "peer")
@@ -41,6 +41,6 @@ def test_every_place_is_told(tmp_path: Path) -> None:
 
 
 def test_a_program_that_is_gone_by_then_is_one_line(tmp_path: Path) -> None:
-    config = load(None, {"team.controller": "quadriga-no-such-program"})
+    config = load(None, {"team.agent_command": "quadriga-no-such-program"})
     with pytest.raises(ConfigError, match="'quadriga-no-such-program': No such file or directory"):
         become_controller(config, places_of(config, "r1", tmp_path / "config.toml"))

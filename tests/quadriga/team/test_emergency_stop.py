@@ -14,15 +14,15 @@ import numpy as np
 import pytest
 
 from quadriga.shared.bus.session import HERE, Bus
+from quadriga.shared.codec import decode, encode
+from quadriga.shared.codes import ESTOPPED
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.errors import BusError
 from quadriga.shared.members import SIM
-from quadriga.shared.wire.codec import decode, encode
-from quadriga.shared.wire.codes import ESTOPPED
-from quadriga.shared.wire.messages import EStop, Event, Status
-from quadriga.shared.wire.topics import ESTOP, EVENT, STATUS
+from quadriga.shared.messages import EStop, Event, Status
+from quadriga.shared.topics import ESTOP, EVENT, STATUS
 from quadriga.team import emergency_stop
 from quadriga.team.emergency_stop import stop_team, wait_and_stop
 from quadriga.team.endpoint import free_endpoint

@@ -15,14 +15,14 @@ from rich.console import Console
 from quadriga.drive.driver_words import WHERE
 from quadriga.drive.find import open_link
 from quadriga.shared.bus.session import HERE, READY, Bus, Packet
+from quadriga.shared.codec import MAX_TEXT, MAX_TICK, decode, encode
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError
 from quadriga.shared.members import OPERATOR, SIM
+from quadriga.shared.messages import Clock, EStop, Event, Message, Reference
 from quadriga.shared.runtime.clock import sleep
-from quadriga.shared.wire.codec import MAX_TEXT, MAX_TICK, decode, encode
-from quadriga.shared.wire.messages import Clock, EStop, Event, Message, Reference
-from quadriga.shared.wire.topics import CLOCK, ESTOP, EVENT, REFERENCE
+from quadriga.shared.topics import CLOCK, ESTOP, EVENT, REFERENCE
 from quadriga.team.drive_page import DrivePage
 from quadriga.team.emergency_stop import stop_team
 from quadriga.team.endpoint import free_endpoint
@@ -98,7 +98,7 @@ def test_a_walk_ends_at_the_same_tick_for_who_is_behind(late: bool) -> None:
             while not late and time.tick < tick:
                 time.follow()
                 assert not time.over
-        event(encode(Event(800, 800 * 10**6, "stop", "", "end of world.seconds", "time-over")))
+        event(encode(Event(800, 800 * 10**6, "stop", "", "end of world.duration", "time-over")))
         if late:
             sim.close()  # it leaves once all has arrived
         while not time.over:
@@ -164,7 +164,7 @@ def test_an_operator_whom_forged_times_reach_leaves_when_it_is_told_to(forged: M
     config = load(
         None,
         {"team.robots": 1, "planner.kind": "none", "recorder.enabled": False}
-        | {"bus.endpoint": free_endpoint(), "world.seconds": 8.0, "runtime.priority": "ordinary"},
+        | {"bus.endpoint": free_endpoint(), "world.duration": 8.0, "runtime.priority": "ordinary"},
     )
     told = Flag()
     thread = Thread(target=run, args=(config, told.is_set))

@@ -55,13 +55,13 @@ def test_a_kind_that_is_not_there_is_one_error(kind: str, words: str) -> None:
 @pytest.mark.parametrize(
     ("keys", "words"),
     [
-        ({}, "team.plants: got 'each' with simulated robots and 'complete' yokes"),
+        ({}, "team.plant_per_robot: got true with simulated robots and 'complete' yokes"),
         ({"team.yokes": "none", "estimator.kind": "truth"}, "estimator.kind: got 'truth' with"),
     ],
 )
 def test_what_plants_of_one_robot_cannot_do_is_refused(keys: dict[str, str], words: str) -> None:
     with pytest.raises(ConfigError) as caught:
-        load(None, {"team.robots": 2, "team.plants": "each", **keys})
+        load(None, {"team.robots": 2, "team.plant_per_robot": True, **keys})
     assert words in str(caught.value)
 
 
@@ -74,4 +74,7 @@ def test_what_plants_of_one_robot_cannot_do_is_refused(keys: dict[str, str], wor
     ],
 )
 def test_plants_of_one_robot_walk_unyoked_alone_or_for_real(keys: dict[str, object]) -> None:
-    assert load(None, {"team.robots": 2, "team.plants": "each", **keys}).team.plants == "each"
+    assert (
+        load(None, {"team.robots": 2, "team.plant_per_robot": True, **keys}).team.plant_per_robot
+        == "each"
+    )

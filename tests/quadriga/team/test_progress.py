@@ -10,12 +10,12 @@ import pytest
 from rich.console import Console
 
 from quadriga.shared.bus.session import HERE, READY, Bus
+from quadriga.shared.codec import encode
 from quadriga.shared.config.load import load
 from quadriga.shared.members import SIM
+from quadriga.shared.messages import Clock, Event, Status, Truth
 from quadriga.shared.runtime.clock import monotonic, sleep
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.messages import Clock, Event, Status, Truth
-from quadriga.shared.wire.topics import CLOCK, EVENT, STATUS, TRUTH
+from quadriga.shared.topics import CLOCK, EVENT, STATUS, TRUTH
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.progress import WalkProgress
 from tests.listening import await_listener
@@ -25,7 +25,7 @@ WAIT = 20.0  # s
 
 @pytest.mark.parametrize("known", [True, False])
 def test_time_is_the_clock_s_and_speed_the_truth_s(known: bool) -> None:
-    config = load(None, {"team.robots": 1, "bus.endpoint": free_endpoint(), "world.seconds": 8.0})
+    config = load(None, {"team.robots": 1, "bus.endpoint": free_endpoint(), "world.duration": 8.0})
     text = io.StringIO()
     console = Console(file=text, force_terminal=True, width=120)
     with Bus.open(config.bus, "team", SIM) as sim:
@@ -45,7 +45,7 @@ def test_time_is_the_clock_s_and_speed_the_truth_s(known: bool) -> None:
 
 
 def test_an_event_that_would_steer_the_terminal_is_only_shown() -> None:
-    config = load(None, {"team.robots": 1, "bus.endpoint": free_endpoint(), "world.seconds": 8.0})
+    config = load(None, {"team.robots": 1, "bus.endpoint": free_endpoint(), "world.duration": 8.0})
     text = io.StringIO()
     console = Console(file=text, force_terminal=False, width=120)
     with Bus.open(config.bus, "team", SIM) as sim, WalkProgress(config, console) as progress:
@@ -87,7 +87,7 @@ def test_before_the_walk_those_who_are_awaited_are_named() -> None:
 
 
 def test_without_a_terminal_lines_tell_what_a_bar_would_show() -> None:
-    config = load(None, {"team.robots": 1, "bus.endpoint": free_endpoint(), "world.seconds": 8.0})
+    config = load(None, {"team.robots": 1, "bus.endpoint": free_endpoint(), "world.duration": 8.0})
     text = io.StringIO()
     console = Console(file=text, force_terminal=False, width=120)
     with ExitStack() as stack:

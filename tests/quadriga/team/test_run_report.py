@@ -8,9 +8,9 @@ from rich.console import Console
 
 from quadriga.commands.parser import main
 from quadriga.recordings.summary import SUMMARY
+from quadriga.shared import codes
 from quadriga.shared.errors import ProcessError
-from quadriga.shared.wire import codes
-from quadriga.shared.wire.messages import Event, Status
+from quadriga.shared.messages import Event, Status
 from quadriga.team import run_report
 from quadriga.team.run_report import report_folder
 from tests.quadriga.conftest import WriteRun, run_config
@@ -22,7 +22,9 @@ def event(code: str, robot: str, detail: str) -> list[tuple[str, Event]]:
 
 
 def test_a_finished_walk_is_summed_up_and_drawn(write_run: WriteRun) -> None:
-    folder = write_run(run_config(1, 2.0), extra=event(codes.TIME_OVER, "", "end of world.seconds"))
+    folder = write_run(
+        run_config(1, 2.0), extra=event(codes.TIME_OVER, "", "end of world.duration")
+    )
     summary = report_folder(folder, pictures=False, console=Console(quiet=True))
     assert not summary["fell"]
     assert (folder / SUMMARY).is_file()
@@ -37,7 +39,9 @@ def test_the_table_is_shown_before_anything_is_drawn(
     monkeypatch: pytest.MonkeyPatch,
     slow: str,
 ) -> None:
-    folder = write_run(run_config(1, 2.0), extra=event(codes.TIME_OVER, "", "end of world.seconds"))
+    folder = write_run(
+        run_config(1, 2.0), extra=event(codes.TIME_OVER, "", "end of world.duration")
+    )
     shown = []
 
     def interrupt(*_: object) -> None:
@@ -60,7 +64,9 @@ def test_a_walk_that_was_cut_short_is_a_failure_but_summed_up(write_run: WriteRu
 def test_a_file_that_cannot_be_written_costs_one_line(
     write_run: WriteRun, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    folder = write_run(run_config(1, 2.0), extra=event(codes.TIME_OVER, "", "end of world.seconds"))
+    folder = write_run(
+        run_config(1, 2.0), extra=event(codes.TIME_OVER, "", "end of world.duration")
+    )
     (folder / "summary.json").mkdir()
     assert main(["report", str(folder), "--no-render"]) == 2
     errors = capsys.readouterr().err
@@ -84,7 +90,7 @@ def test_a_robot_that_stopped_on_its_own_is_a_failure_without_a_fall(
 ) -> None:
     nothing = np.zeros(0)
     lost = Status(1999, 1999 * 10**6, "stand", "peer-lost:r2", "kalman", {}, {}, nothing, nothing)
-    end = event(codes.TIME_OVER, "", "end of world.seconds")
+    end = event(codes.TIME_OVER, "", "end of world.duration")
     folder = write_run(run_config(1, 2.0), extra=[("team/r1/status", lost), *end])
     assert main(["report", str(folder), "--no-render"]) == 1
     assert "peer-lost:r2" in capsys.readouterr().out

@@ -12,12 +12,12 @@ import pytest
 from quadriga.commands.parser import main
 from quadriga.identification.cache import predictor_key
 from quadriga.recordings.summary import summarise
+from quadriga.shared.codec import encode
+from quadriga.shared.codes import FAULT_BEGINS
 from quadriga.shared.config.load import build, layers, load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.codes import FAULT_BEGINS
 from quadriga.sim_server.world.world import World
 from quadriga.team.operator import reference_at
 from quadriga.team.scenarios import description, label, names, path
@@ -74,7 +74,7 @@ def test_no_scenario_asks_for_a_predictor_of_its_own(name: str) -> None:
 @pytest.mark.parametrize("name", PROMISED)
 def test_another_seed_is_another_world_even_without_sensor_noise(name: str) -> None:
     def told(seed: int) -> tuple[bytes, ...]:
-        config = load(path(name), {"world.seed": seed, "world.seconds": 8.0})
+        config = load(path(name), {"world.seed": seed, "world.duration": 8.0})
         world = World(replace(config, sensors=SILENT))
         events = b"".join(encode(event) for event in world._scenario.events)
         asked = b"".join(encode(reference_at(config, tick)) for tick in range(1000, 5000, 500))

@@ -11,17 +11,16 @@ import numpy as np
 import pytest
 
 from quadriga.commands.parser import main
-from quadriga.shared import members
+from quadriga.shared import members, messages
 from quadriga.shared.bus.session import HERE, Bus
+from quadriga.shared.codec import encode
+from quadriga.shared.codes import STOP_ASKED
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.members import SIM
-from quadriga.shared.wire import messages
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.codes import STOP_ASKED
-from quadriga.shared.wire.messages import SafeStop, Status
-from quadriga.shared.wire.topics import EVENT, STATUS, STOP
+from quadriga.shared.messages import SafeStop, Status
+from quadriga.shared.topics import EVENT, STATUS, STOP
 from quadriga.team import safe_stop
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.talk import TeamTalk

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from quadriga.shared.codec import decode
+from quadriga.shared.messages import State, Truth
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.wire.codec import decode
-from quadriga.shared.wire.messages import State, Truth
-from quadriga.shared.wire.topics import topic_of
+from quadriga.shared.topics import topic_of
 from quadriga.view.compose import compose
 from quadriga.view.gather import Gatherer
 from quadriga.view.readings import read_accounts

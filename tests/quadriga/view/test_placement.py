@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from quadriga.recordings.dead_reckoning import follow_speeds
-from quadriga.shared.wire.messages import Measurement
+from quadriga.shared.messages import Measurement
 from quadriga.view.placement import LONGEST_MS, Placement, quat_of
 
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from quadriga.recordings.metadata import build_metadata
+from quadriga.shared import messages as msg
+from quadriga.shared.codec import encode
 from quadriga.shared.config.load import load
 from quadriga.shared.errors import RecordingError
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.recording.writer import RecordingWriter
-from quadriga.shared.wire import messages as msg
-from quadriga.shared.wire.codec import encode
 from quadriga.view.compose import compose
 from quadriga.view.picture import Picture
 from quadriga.view.readings import read_accounts, read_outputs

@@ -28,7 +28,7 @@ from quadriga.view.viser_server import open_server
 
 
 def terrain(kind: str, **keys: object) -> Terrain:
-    given = {"world.terrain": kind, "world.seconds": 1.0, "world.terrain_height": 0.05}
+    given = {"world.terrain": kind, "world.duration": 1.0, "world.terrain_height": 0.05}
     return build_team_shape(load(None, given | keys)).terrain
 
 

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from quadriga.shared.bus.ring_buffer import Newest
+from quadriga.shared.codec import encode
 from quadriga.shared.config.sections import Config
+from quadriga.shared.messages import Status
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.messages import Status
 from quadriga.view.curves import SAMPLES, CurveWindow, axis_range, ticks_before
 from quadriga.view.live import _Feed
 from quadriga.view.readings import read_outputs

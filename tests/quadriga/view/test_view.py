@@ -22,12 +22,12 @@ from websockets.exceptions import InvalidStatus
 
 from quadriga.commands.parser import main
 from quadriga.shared.bus.session import HERE, Bus
+from quadriga.shared.codec import encode
 from quadriga.shared.config.sections import BusConfig, Config
 from quadriga.shared.config.write import to_toml
+from quadriga.shared.messages import Message
 from quadriga.shared.runtime.clock import monotonic, sleep
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.messages import Message
-from quadriga.shared.wire.topics import POSTURE, STATE
+from quadriga.shared.topics import POSTURE, STATE
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import QUADRIGA
 from quadriga.team.spectator import view_beside

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any, Final
 
+from quadriga.shared.about import ORDINARY, READY, About
 from quadriga.shared.bus.diagnostics import MemberAnswer, TeamNorm, TeamView
-from quadriga.shared.wire.about import ORDINARY, READY, About
 
 NAMES: Final = frozenset({"sim", "r1", "r2"})
 SIM: Final = About(

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from quadriga.shared.about import About
 from quadriga.shared.bus.diagnostics import (
     BAD,
     GOOD,
@@ -20,7 +21,6 @@ from quadriga.shared.bus.diagnostics import (
 )
 from quadriga.shared.errors import BusError
 from quadriga.shared.members import Member, team_members
-from quadriga.shared.wire.about import About
 from tests.shared.bus.abouts import NAMES, SIM, about, answer, view
 
 MEMBERS = {m.name: m for m in team_members(("r1", "r2"), central=False, recorded=False)}
@@ -128,7 +128,7 @@ def test_a_clock_is_off_by_more_than_what_the_question_took(
     assert [item.text for item in found if item.code == "clock-off"] == [text] * bool(text)
 
 
-PACED = about("plant_r1", config=('team.plants="each"', 'world.mode="realtime"'))
+PACED = about("plant_r1", config=("team.plant_per_robot=true", 'world.mode="realtime"'))
 EACH = team_members(("r1", "r2"), central=False, recorded=False, plant_each=True)
 
 

@@ -12,6 +12,7 @@ from threading import Thread
 
 import pytest
 
+from quadriga.shared.about import ABOUT
 from quadriga.shared.bus import discovery
 from quadriga.shared.bus.discovery import (
     REJOINS,
@@ -26,12 +27,11 @@ from quadriga.shared.bus.discovery import (
 from quadriga.shared.bus.membership import members
 from quadriga.shared.bus.process_info import ProcessInfo, describe_process
 from quadriga.shared.bus.session import HERE, READY, Bus
+from quadriga.shared.codec import encode
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError
 from quadriga.shared.runtime.clock import wall_ns
-from quadriga.shared.wire.about import ABOUT
-from quadriga.shared.wire.codec import encode
 from quadriga.team.endpoint import free_endpoint
 
 NAMES = ("sim", "r1", "r2", "operator")
@@ -217,7 +217,7 @@ def test_a_team_starts_with_controllers_that_do_not_say_what_they_are(
     config: Config, buses: dict[str, Bus]
 ) -> None:
     """One that does say it must have the same version."""
-    team = replace(config.team, controller="walk")
+    team = replace(config.team, agent_command="walk")
     config = replace(config, team=team, planner=replace(config.planner, kind="none"))
     for name in ("sim", "operator"):
         ProcessInfo(buses[name], config)
@@ -326,7 +326,12 @@ def test_who_is_started_with_its_team_starts() -> None:
 @pytest.mark.parametrize("again", ["plant_r2", "r2"])
 def test_a_robot_that_is_started_again_does_not_join_a_team_that_walks(again: str) -> None:
     """Its bridge, or its agent, even where the one before is gone already."""
-    each = {"team.robots": 2, "team.plants": "each", "team.yokes": "none", "planner.kind": "none"}
+    each = {
+        "team.robots": 2,
+        "team.plant_per_robot": True,
+        "team.yokes": "none",
+        "planner.kind": "none",
+    }
     config = team(**each)
     names = sorted(members(config), key=lambda name: name != "plant_r1")
     buses = {name: enter(config, name) for name in names}

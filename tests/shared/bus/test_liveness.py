@@ -11,12 +11,12 @@ import pytest
 from quadriga.shared.bus import liveness
 from quadriga.shared.bus.liveness import Liveness, Loss, find_loss, loss_error, missed_ns_of
 from quadriga.shared.bus.session import HERE, Bus
+from quadriga.shared.codes import LEAD_GONE, LINK_LOST
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.members import SIM
 from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns
-from quadriga.shared.wire.codes import LEAD_GONE, LINK_LOST
 from quadriga.team.endpoint import free_endpoint
 
 WAIT = 20.0  # s

@@ -35,10 +35,10 @@ def test_no_file_gives_every_default() -> None:
 
 
 def test_file_then_overrides(tmp_path: Path) -> None:
-    path = write(tmp_path, "[team]\nrobots = 5\n[world]\nseed = 7\nseconds = 3\n")
+    path = write(tmp_path, "[team]\nrobots = 5\n[world]\nseed = 7\nduration = 3\n")
     config = load(path, {"team.robots": 2, "reference.vx": 0.25})
     assert (config.team.robots, config.world.seed, config.reference.vx) == (2, 7, 0.25)
-    assert type(config.world.seconds) is float
+    assert type(config.world.duration) is float
 
 
 def test_a_mark_of_the_byte_order_is_no_key(tmp_path: Path) -> None:

@@ -66,7 +66,7 @@ def test_the_papers_planner_has_its_weights_and_nothing_that_it_does_not_name() 
     assert not planner.compensation
     weight = paper.robot.weight
     assert min(planner.deviation_max) > 10 * weight
-    assert min(planner.fade) > 1e3
+    assert min(planner.trust_range) > 1e3
     assert paper.identification.predictor == "pinv"
 
 

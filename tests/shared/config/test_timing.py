@@ -7,7 +7,7 @@ import pytest
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config, EstimatorConfig, PlannerConfig, WorldConfig
 from quadriga.shared.config.timing import max_ages, periods
-from quadriga.shared.wire.topics import CONFIGURED, TABLE
+from quadriga.shared.topics import CONFIGURED, TABLE
 
 
 def test_periods_follow_the_configuration() -> None:
@@ -23,13 +23,13 @@ def test_periods_follow_the_configuration() -> None:
 
 
 @pytest.mark.parametrize(
-    ("mode", "plants", "period"),
-    [("lockstep", "one", 10), ("lockstep", "each", 1), ("realtime", "each", 10)],
+    ("mode", "own", "period"),
+    [("lockstep", False, 10), ("lockstep", True, 1), ("realtime", True, 10)],
 )
 def test_plants_in_lock_step_follow_every_tick_of_the_clock(
-    mode: str, plants: str, period: int
+    mode: str, own: bool, period: int
 ) -> None:
-    given = {"world.mode": mode, "team.plants": plants, "team.yokes": "none"}
+    given = {"world.mode": mode, "team.plant_per_robot": own, "team.yokes": "none"}
     assert periods(load(None, given))["clock"] == period
 
 

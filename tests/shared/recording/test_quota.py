@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from quadriga.shared.codec import encode
 from quadriga.shared.recording import quota
 from quadriga.shared.recording.metadata import COUNTS
 from quadriga.shared.recording.quota import (
@@ -18,7 +19,6 @@ from quadriga.shared.recording.quota import (
 )
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.recording.writer import RecordingWriter
-from quadriga.shared.wire.codec import encode
 from tests.shared.recording.test_reader import METADATA, state
 
 OWN = "team/r1/state"

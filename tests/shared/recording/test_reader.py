@@ -11,13 +11,13 @@ from mcap.reader import make_reader
 from mcap.records import Channel, Chunk, DataEnd, Footer
 from mcap.stream_reader import StreamReader, breakup_chunk
 
+from quadriga.shared.codec import decode, encode
 from quadriga.shared.errors import RecordingError
+from quadriga.shared.messages import Command, Reference, State
 from quadriga.shared.recording.metadata import PROFILE, seal
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.recording.writer import McapFile, RecordingWriter
-from quadriga.shared.wire.codec import decode, encode
-from quadriga.shared.wire.messages import Command, Reference, State
-from quadriga.shared.wire.topics import COMMAND, TABLE
+from quadriga.shared.topics import COMMAND, TABLE
 
 METADATA = {"team": "team", "config_sha256": "ab" * 32}
 

@@ -18,7 +18,9 @@ from mcap.records import Chunk
 from mcap.writer import CompressionType, IndexType, Writer
 
 from quadriga.recordings.recover import recover
+from quadriga.shared.codec import encode
 from quadriga.shared.errors import RecordingError
+from quadriga.shared.messages import Reference
 from quadriga.shared.recording.metadata import PROFILE, seal
 from quadriga.shared.recording.reader import (
     CORRUPT,
@@ -30,8 +32,6 @@ from quadriga.shared.recording.reader import (
 )
 from quadriga.shared.recording.recover import DamagedRecording
 from quadriga.shared.recording.writer import RecordingWriter
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.messages import Reference
 from tests.shared.recording.test_reader import METADATA, command, state
 
 KEYS = ("team/r1/state", "team/r1/command", "team/r2/state", "team/reference")

@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from quadriga.shared.codec import encode
 from quadriga.shared.config.load import load
+from quadriga.shared.messages import Consumed
 from quadriga.shared.recording.ticks import SkippedTicks, TickTrack
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.messages import Consumed
 
 
 @given(

@@ -140,7 +140,7 @@ def test_the_sources_are_those_with_compiled_functions_and_what_they_import() ->
         "quadriga/agents/controller/acting.py",
         "quadriga/agents/controller/swing.py",
         "quadriga/agents/gait.py",
-        "quadriga/shared/robot/a1.py",
+        "quadriga/shared/robots/a1.py",
         "quadriga/sim_server/world/sensors.py",
     } <= found
     assert (

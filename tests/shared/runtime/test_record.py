@@ -6,8 +6,8 @@ from dataclasses import fields, replace
 
 import pytest
 
+from quadriga.shared.messages import Event
 from quadriga.shared.runtime.record import record
-from quadriga.shared.wire.messages import Event
 
 
 @record

@@ -7,8 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from quadriga.shared.codec import MAX_BYTES, encode
 from quadriga.shared.config.load import load
-from quadriga.shared.robot.conventions import robot_names
+from quadriga.shared.messages import Event, Message, Plan, Status, Truth
+from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.security.access import (
     Rights,
     access_control,
@@ -19,11 +21,9 @@ from quadriga.shared.security.access import (
     team_rights,
 )
 from quadriga.shared.security.markdown import PAGE, renewed
-from quadriga.shared.wire.codec import MAX_BYTES, encode
-from quadriga.shared.wire.messages import Event, Message, Plan, Status, Truth
-from quadriga.shared.wire.topics import COMMAND, STATE, TABLE, Topic
+from quadriga.shared.topics import COMMAND, STATE, TABLE, Topic
 
-EACH = {"team.plants": "each", "team.yokes": "none"}
+EACH = {"team.plant_per_robot": True, "team.yokes": "none"}
 
 
 def rights(**given: object) -> dict[str, Rights]:

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from quadriga.shared.unitree.codecs import A1, CODECS, GO1, GO2, Codec, crc32
 from quadriga.shared.unitree.packets import (
     FOOT_PLACES,

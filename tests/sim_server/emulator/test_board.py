@@ -13,11 +13,11 @@ from quadriga.bridges.plant import bridge_of
 from quadriga.shared.config.bridge import BridgeConfig
 from quadriga.shared.config.load import load
 from quadriga.shared.errors import BridgeError, ConfigError
-from quadriga.shared.robot.conventions import JOINT_NAMES
+from quadriga.shared.messages import Command
+from quadriga.shared.robots.conventions import JOINT_NAMES
 from quadriga.shared.unitree.codecs import A1
 from quadriga.shared.unitree.packets import NO_ANGLE, NO_RATE, OFF, PROTECTED, SERVO, RobotReport
 from quadriga.shared.unitree.udp import Address
-from quadriga.shared.wire.messages import Command
 from quadriga.sim_server.emulator.board import RobotStatus, UdpBoard, open_boards
 from quadriga.sim_server.emulator.link import LinkFaults
 from quadriga.sim_server.world.world import World

@@ -13,9 +13,9 @@ import pytest
 from quadriga.bridges.drivers import Go2Driver
 from quadriga.shared.config.bridge import BridgeConfig
 from quadriga.shared.config.load import load
+from quadriga.shared.messages import Command
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.unitree.packets import pressed_buttons
-from quadriga.shared.wire.messages import Command
 from quadriga.sim_server.emulator.board import Go2Board, RobotStatus
 from quadriga.sim_server.emulator.link import LinkFaults
 from quadriga.sim_server.world.world import World

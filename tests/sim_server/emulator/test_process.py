@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 
 from quadriga.shared.config.load import load
-from quadriga.shared.robot.conventions import JOINT_NAMES, Array
+from quadriga.shared.messages import Command
+from quadriga.shared.robots.conventions import JOINT_NAMES, Array
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.unitree.codecs import A1
 from quadriga.shared.unitree.packets import pressed_buttons
 from quadriga.shared.unitree.udp import Address
-from quadriga.shared.wire.messages import Command
 from quadriga.sim_server.emulator.board import Board, UdpBoard
 from quadriga.sim_server.emulator.link import LinkFaults
 from quadriga.sim_server.emulator.process import (
@@ -134,7 +134,9 @@ def test_what_lasts_is_told_with_the_tick_at_which_it_began() -> None:
 
 @pytest.mark.parametrize("kind", ["a1", "go1", "go2"])
 def test_a_robot_that_hangs_stays_level_and_in_place_while_its_legs_move(kind: str) -> None:
-    config = load(overrides={"team.robots": 2, "team.robot": kind, "world.spawn": "lying"})
+    config = load(
+        overrides={"team.robots": 2, "team.robot": kind, "world.initial_posture": "lying"}
+    )
     world, stand = World(config), config.robot.q_stand
     harness = Harness(world)
     place = world.truth().base_pos.copy()

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from quadriga.pictures.mujoco_frames import add_stones
-from quadriga.shared.robot.conventions import GRAVITY, N_LEGS, Array
-from quadriga.shared.wire.codec import encode
+from quadriga.shared.codec import encode
+from quadriga.shared.robots.conventions import GRAVITY, N_LEGS, Array
 from quadriga.sim_server.terrain.pebbles import LooseStones, Pebbles
 from quadriga.sim_server.world.world import World
 from tests.a1 import TOTAL_MASS

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from quadriga.shared.config.sections import ReferenceConfig
-from quadriga.shared.robot.conventions import GRAVITY, Array
+from quadriga.shared.robots.conventions import GRAVITY, Array
 from quadriga.sim_server.terrain.ground import Stairs
 from quadriga.sim_server.terrain.terrain import build_terrain
 from quadriga.sim_server.world.team_model import formation

@@ -8,7 +8,7 @@ import pytest
 
 from quadriga.shared.config.reference_trace import inline_trace, trace_of
 from quadriga.shared.config.sections import Config, ReferenceConfig
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 from quadriga.sim_server.terrain.ground import HeightField
 from quadriga.sim_server.terrain.relief import build_course
 from quadriga.sim_server.terrain.terrain import Terrain, build_terrain
@@ -102,7 +102,7 @@ def test_smooth_field_is_smooth_at_the_scale_of_a_foot() -> None:
 )
 def test_course_contains_the_nominal_way(vx: float, vy: float, wz: float) -> None:
     config, _ = laid("flat", vx=vx, vy=vy, wz=wz)
-    config = replace(config, world=replace(config.world, seconds=20.0))
+    config = replace(config, world=replace(config.world, duration=20.0))
     places = formation(3, config.team.spacing)
     course = build_course(config, places)
     yaw, at = 0.0, places.mean(axis=0)
@@ -128,7 +128,7 @@ def test_terrain_follows_a_trace_and_not_the_speed_it_replaces(
         config, _ = laid("flat", vx=asked)
         config = replace(
             config,
-            world=replace(config.world, seconds=seconds),
+            world=replace(config.world, duration=seconds),
             reference=replace(config.reference, trace=inline_trace(trace)),
         )
         places = formation(3, config.team.spacing)
@@ -144,7 +144,7 @@ def test_terrain_follows_a_trace_and_not_the_speed_it_replaces(
 
 def test_a_very_long_way_is_covered_to_a_bound_only() -> None:
     config, _ = laid("flat", vx=0.5)
-    config = replace(config, world=replace(config.world, seconds=3600.0))
+    config = replace(config, world=replace(config.world, duration=3600.0))
     extent = build_course(config, formation(1, 0.9)).extent
     assert 40.0 < extent.x_high < 50.0
 

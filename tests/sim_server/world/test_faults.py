@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from quadriga.shared import codes
+from quadriga.shared.codec import encode
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot.conventions import JOINT_NAMES, Array
-from quadriga.shared.robot.robots import ROBOTS
-from quadriga.shared.wire import codes
-from quadriga.shared.wire.codec import encode
-from quadriga.shared.wire.messages import Command, Event, State
+from quadriga.shared.messages import Command, Event, State
+from quadriga.shared.robots.conventions import JOINT_NAMES, Array
+from quadriga.shared.robots.registry import ROBOTS
 from quadriga.sim_server.world.faults import (
     KINDS,
     SPAN_MS,

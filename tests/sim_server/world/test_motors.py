@@ -12,11 +12,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quadriga.shared.config.motors import MotorsConfig
-from quadriga.shared.robot.a1 import A1
-from quadriga.shared.robot.conventions import N_JOINTS, Array
-from quadriga.shared.robot.robots import ROBOTS
-from quadriga.shared.robot.torque_speed import motor_curves, torque_range
-from quadriga.shared.wire.messages import Command
+from quadriga.shared.messages import Command
+from quadriga.shared.robots.a1 import A1
+from quadriga.shared.robots.conventions import N_JOINTS, Array
+from quadriga.shared.robots.registry import ROBOTS
+from quadriga.shared.robots.torque_speed import motor_curves, torque_range
 from quadriga.sim_server.world.motors import Motors
 from quadriga.sim_server.world.world import World
 from tests.sim_server.standing import IDEAL_MOTORS, STAND, command, configured, stand

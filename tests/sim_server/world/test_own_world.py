@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.wire.messages import Truth
+from quadriga.shared.messages import Truth
+from quadriga.shared.robots.conventions import Array
 from quadriga.sim_server.world.world import World
 from tests.sim_server.standing import configured, stand
 

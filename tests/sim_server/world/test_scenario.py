@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot.conventions import JOINT_NAMES, robot_names
+from quadriga.shared.robots.conventions import JOINT_NAMES, robot_names
 from quadriga.sim_server.world.scenario import (
     Push,
     WeakMotor,

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import SensorsConfig
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.wire.messages import State
+from quadriga.shared.messages import State
+from quadriga.shared.robots.conventions import Array
 from quadriga.sim_server.world.sensors import Sensors, turn_matrices
 from tests.bridges.robots import real_go1_counts
 from tests.sim_server.standing import SILENT

@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quadriga.shared.config.yokes import yoke_pairs
-from quadriga.shared.robot.a1 import A1
-from quadriga.shared.robot.conventions import FOOT_FRAMES, JOINT_NAMES, N_JOINTS
-from quadriga.shared.robot.pinocchio_model import build_pinocchio_model
-from quadriga.shared.robot.robots import ROBOTS
+from quadriga.shared.robots.a1 import A1
+from quadriga.shared.robots.conventions import FOOT_FRAMES, JOINT_NAMES, N_JOINTS
+from quadriga.shared.robots.pinocchio_model import build_pinocchio_model
+from quadriga.shared.robots.registry import ROBOTS
 from quadriga.sim_server.terrain.relief import TERRAIN_CONTACT
 from quadriga.sim_server.world.layout import CONTACT_FORCES, FOOT_FORCES, NQ
 from quadriga.sim_server.world.team_model import build_team_model, formation, spawn_positions

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from quadriga.plant.late import MOTOR_DAMPING
+from quadriga.shared.codec import decode, encode
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot.a1 import A1
-from quadriga.shared.robot.conventions import GRAVITY, N_JOINTS
-from quadriga.shared.wire.codec import decode, encode
-from quadriga.shared.wire.messages import Event, State, Truth
+from quadriga.shared.messages import Event, State, Truth
+from quadriga.shared.robots.a1 import A1
+from quadriga.shared.robots.conventions import GRAVITY, N_JOINTS
 from quadriga.sim_server.world.world import World
 from tests.a1 import TORQUE_LIMIT, TOTAL_MASS, q_stand
 from tests.sim_server.standing import STAND, command, configured, momentum, shift, stand

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from quadriga.agents.controller.maths.leg_kinematics import leg_kinematics
-from quadriga.shared.robot.conventions import FOOT_FRAMES, N_JOINTS, Array
-from quadriga.shared.robot.pinocchio_model import build_pinocchio_model
-from quadriga.shared.robot.robots import ROBOTS
-from quadriga.shared.robot.spec import RobotSpec
+from quadriga.shared.robots.conventions import FOOT_FRAMES, N_JOINTS, Array
+from quadriga.shared.robots.pinocchio_model import build_pinocchio_model
+from quadriga.shared.robots.registry import ROBOTS
+from quadriga.shared.robots.spec import RobotSpec
 
 ANGLES = arrays(np.float64, N_JOINTS, elements=st.floats(-np.pi, np.pi))
 RATES = arrays(np.float64, N_JOINTS, elements=st.floats(-20.0, 20.0))

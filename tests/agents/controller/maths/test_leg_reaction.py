@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from quadriga.agents.controller.maths.leg_reaction import LegMotion, foot_forces, reaction_torques
-from quadriga.shared.robot.conventions import GRAVITY, Array
+from quadriga.shared.robots.conventions import GRAVITY, Array
 from tests.a1 import GEOMETRY
 from tests.agents.controller.poses import BODY, FEET, MODEL, random_pose, standing_pose
 

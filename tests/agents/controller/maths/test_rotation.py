@@ -16,7 +16,7 @@ from quadriga.agents.controller.maths.rotation import (
     rotation_matrix,
     wrap_angle,
 )
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.conventions import Array
 
 QUATERNIONS = arrays(np.float64, 4, elements=st.floats(-1.0, 1.0)).filter(
     lambda quat: bool(np.linalg.norm(quat) > 0.1)

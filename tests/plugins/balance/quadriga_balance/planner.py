@@ -9,8 +9,8 @@ from quadriga.agents.planning.interface import PlanningInputs, PlanningInterface
 from quadriga.agents.planning.operator_references import reference_at
 from quadriga.agents.predictor.episode import commanded_outputs
 from quadriga.agents.time_grid import first_step, horizon_stance, step_ms
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.wire.messages import Plan
+from quadriga.shared.messages import Plan
+from quadriga.shared.robots.conventions import Array
 
 FRONT, LEFT = np.array([1, 1, -1, -1]), np.array([1, -1, 1, -1])  # of FL FR RL RR
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.messages import Message, array, plain
+from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.record import record
-from quadriga.shared.wire.messages import Message, array, plain
-from quadriga.shared.wire.topic import Topic
+from quadriga.shared.topic import Topic
 
 
 @record

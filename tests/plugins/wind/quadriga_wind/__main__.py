@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 
 from quadriga.shared.bus.session import HERE, POLL, Bus
+from quadriga.shared.codec import decode, encode, envelope
 from quadriga.shared.config.load import load
 from quadriga.shared.errors import QuadrigaError
 from quadriga.shared.members import has_lead
+from quadriga.shared.messages import Event
 from quadriga.shared.runtime.clock import sleep
-from quadriga.shared.wire.codec import decode, encode, envelope
-from quadriga.shared.wire.messages import Event
-from quadriga.shared.wire.topics import EVENT, TRUTH
+from quadriga.shared.topics import EVENT, TRUTH
 
 from . import WIND, Wind
 

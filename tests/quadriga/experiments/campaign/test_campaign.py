@@ -31,7 +31,7 @@ def scenario(tmp_path: Path) -> Path:
     """One robot on small boxes for half a second."""
     path = tmp_path / "steps.toml"
     path.write_text(
-        '[team]\nrobots = 1\n[world]\nterrain = "boxes"\nterrain_height = 0.03\nseconds = 0.5\n',
+        '[team]\nrobots = 1\n[world]\nterrain = "boxes"\nterrain_height = 0.03\nduration = 0.5\n',
         encoding="utf-8",
     )
     return path

@@ -33,7 +33,7 @@ def words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Two linear robots without and with planners, two seeds of half a second."""
     put_data(tmp_path / "cache", monkeypatch)
     scenario = tmp_path / "flat.toml"
-    scenario.write_text("[world]\nseconds = 0.5\n", encoding="utf-8")
+    scenario.write_text("[world]\nduration = 0.5\n", encoding="utf-8")
     return [str(scenario), "--planners", "none,distributed,deepc", "--seeds", "0:2", *arguments()]
 
 

@@ -36,10 +36,12 @@ def test_controllers_are_walked_beside_the_projects_own(
 ) -> None:
     scenario, out = tmp_path / "short.toml", tmp_path / "out"
     scenario.write_text(
-        "[team]\nrobots = 1\n[world]\nseconds = 0.5\n[gait]\nstand_ms = 100\n", encoding="utf-8"
+        "[team]\nrobots = 1\n[world]\nduration = 0.5\n[gait]\nstand_ms = 100\n", encoding="utf-8"
     )
     stands, fails = script(tmp_path, "stands", -1), script(tmp_path, "fails", 300)
-    variants = f"none,stands:team.controller=python {stands},fails:team.controller=python {fails}"
+    variants = (
+        f"none,stands:team.agent_command=python {stands},fails:team.agent_command=python {fails}"
+    )
     words = ["campaign", str(scenario), "--jobs", "1", "--out", str(out), "--planners", variants]
     assert main([*words, "--seeds", "0"]) == 0
     rows = {row.variant: row for row in read_rows(out, read_manifest(out))}
@@ -67,8 +69,8 @@ def test_a_controller_that_cannot_even_start_ends_the_campaign(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     scenario = tmp_path / "short.toml"
-    scenario.write_text("[team]\nrobots = 1\n[world]\nseconds = 0.5\n", encoding="utf-8")
+    scenario.write_text("[team]\nrobots = 1\n[world]\nduration = 0.5\n", encoding="utf-8")
     words = ["campaign", str(scenario), "--jobs", "1", "--out", str(tmp_path / "out")]
-    planners = ["--planners", "mine:team.controller=python no_such.py"]
+    planners = ["--planners", "mine:team.agent_command=python no_such.py"]
     assert main([*words, *planners, "--seeds", "0"]) == 2
-    assert "team.controller: got no file 'no_such.py'" in capsys.readouterr().err
+    assert "team.agent_command: got no file 'no_such.py'" in capsys.readouterr().err

@@ -30,7 +30,7 @@ def test_trials_are_walked_again_side_by_side_unless_an_endpoint_is_asked_for(
         return 0
 
     monkeypatch.setattr(quadriga.team.walk, "walk", walk)
-    trial, config = row(seed=7), load(None, {"bus.endpoint": endpoint, "world.seconds": 1.5})
+    trial, config = row(seed=7), load(None, {"bus.endpoint": endpoint, "world.duration": 1.5})
     write_configs(tmp_path, {trial.group: config})
     assert load(config_file(tmp_path, trial.group)) == config
     again = shlex.split(build_command(tmp_path, trial))

@@ -22,7 +22,7 @@ from quadriga.experiments.probe.pulses import DIRECTIONS, pulse_starts
 from quadriga.experiments.probe.responses import Responses
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robot.conventions import OUTPUTS, Array
+from quadriga.shared.robots.conventions import OUTPUTS, Array
 
 N = 6
 

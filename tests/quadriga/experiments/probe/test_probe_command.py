@@ -9,7 +9,7 @@ import pytest
 
 from quadriga.commands.parser import main
 from quadriga.identification.cache import predictor_path
-from quadriga.shared.robot.conventions import OUTPUTS
+from quadriga.shared.robots.conventions import OUTPUTS
 from tests.quadriga.linear_data import arguments, config_of, put_data
 
 MAPS = (

@@ -11,7 +11,7 @@ from quadriga.shared.config.sections import Config
 from tests.quadriga.identification.test_cache import ALL, changed
 
 WHOLE = ("sensors", "estimator", "gait", "controller", "world", "reference", "team", "motors")
-NOT = {*("team.name", "team.plant", "team.plants", "world.scenario", "world.mode")}
+NOT = {*("team.name", "team.plant", "team.plant_per_robot", "world.scenario", "world.mode")}
 PLANNED = {"planner.interface", "planner.N", "planner.applied"}
 OTHERS = ("bridge", "bus", "identification", "recorder", "runtime", "planner")
 

@@ -25,7 +25,7 @@ scenarios = ["flat", "turn"]
 planners = ["none"]
 seeds = "0:3"
 [common]
-world.seconds = 1.0
+world.duration = 1.0
 [variants.soft]
 controller.kp_tilt = 500.0
 planner.kind = "none"
@@ -59,8 +59,8 @@ def test_a_file_is_a_whole_experiment(tmp_path: Path) -> None:
     assert (found.name, found.title, found.baseline) == ("small", "Small", "none")
     assert found.seeds == (0, 1, 2)
     none, soft = found.variants
-    assert none.keys == {"world.seconds": 1.0, **PLANNERS["none"]}
-    assert soft.keys == {"world.seconds": 1.0, "controller.kp_tilt": 500.0, "planner.kind": "none"}
+    assert none.keys == {"world.duration": 1.0, **PLANNERS["none"]}
+    assert soft.keys == {"world.duration": 1.0, "controller.kp_tilt": 500.0, "planner.kind": "none"}
     assert found.groups() == [
         Group("flat", "none", ()),
         Group("flat", "soft", ()),
@@ -223,7 +223,7 @@ def test_from_the_paper_to_the_default_one_thing_changes_at_a_time() -> None:
             assert together or sections == {"controller"}
     left = {key for key, *_ in departures(configs["damped"], build({}))}
     gate = {"identification.max_radius", "identification.max_peers_harm"}
-    assert left == {"world.seconds", *gate}
+    assert left == {"world.duration", *gate}
 
 
 def test_all_that_are_promised_are_there_in_order() -> None:

@@ -19,7 +19,7 @@ Said = pytest.CaptureFixture[str]
 def experiment(tmp_path: Path) -> Path:
     """One robot on small boxes for a second, and one with softer gains."""
     (tmp_path / "steps.toml").write_text(
-        '[team]\nrobots = 1\n[world]\nterrain = "boxes"\nterrain_height = 0.03\nseconds = 1.0\n',
+        '[team]\nrobots = 1\n[world]\nterrain = "boxes"\nterrain_height = 0.03\nduration = 1.0\n',
         encoding="utf-8",
     )
     path = tmp_path / "tiny.toml"

@@ -12,7 +12,7 @@ from quadriga.experiments.trial.figures_of_merit import Walk, compute_figures
 from quadriga.experiments.trial.over_bus import read_walk
 from quadriga.recordings.summary import steady_from, summary_of
 from quadriga.recordings.traces import ERRORS, Traces
-from quadriga.shared.wire.messages import Event
+from quadriga.shared.messages import Event
 from tests.quadriga.conftest import ESTIMATOR_ERROR, SPEED
 
 

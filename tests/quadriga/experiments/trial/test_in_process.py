@@ -15,10 +15,10 @@ from quadriga.experiments.trial.in_process import build_timed_agents, roll_out
 from quadriga.experiments.trial.over_bus import walk_over_bus
 from quadriga.identification.predictors import fit
 from quadriga.identification.rollout import Tick
+from quadriga.shared.codec import encode
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robot.conventions import GRAVITY
-from quadriga.shared.wire.codec import encode
+from quadriga.shared.robots.conventions import GRAVITY
 from tests.a1 import TOTAL_MASS
 from tests.quadriga.linear_data import config_of, dataset
 
@@ -38,7 +38,7 @@ def untimed(found: Figures) -> Figures:
 def test_over_the_bus_a_trial_comes_to_the_same(tmp_path: Path) -> None:
     """Two robots that plan with each other's plans, each a process of its own, on rough ground."""
     config = config_of(
-        world__seconds=1.4,
+        world__duration=1.4,
         world__seed=3,
         world__terrain="boxes",
         world__terrain_height=0.05,
@@ -74,7 +74,7 @@ def test_over_the_bus_a_trial_comes_to_the_same(tmp_path: Path) -> None:
 
 def test_the_motors_work_is_that_of_a_trot() -> None:
     """The cost of transport of a trot; and robots that merely stand do next to nothing."""
-    config = config_of(planner__kind="none", world__seconds=3.0)
+    config = config_of(planner__kind="none", world__duration=3.0)
     found = compute_figures(roll_out(config, build_timed_agents(config, None), None))
     assert found.work is not None
     assert found.distance is not None
@@ -83,7 +83,7 @@ def test_the_motors_work_is_that_of_a_trot() -> None:
     weight = 2 * TOTAL_MASS * GRAVITY
     assert found.cost_of_transport == pytest.approx(found.work / (weight * found.distance))
     assert 0.3 < found.cost_of_transport < 3.0
-    config = config_of(planner__kind="none", world__seconds=0.5, gait__stand_ms=1000)
+    config = config_of(planner__kind="none", world__duration=0.5, gait__stand_ms=1000)
     still = compute_figures(roll_out(config, build_timed_agents(config, None), None))
     assert still.work is not None
     assert still.work < 0.05 * found.work

@@ -54,5 +54,5 @@ def test_a_controller_of_ones_own_is_named_with_its_files(tmp_path: Path) -> Non
     script = tmp_path / "walk.py"
     script.touch()
     assert foreign_origin(load(None)) == ""
-    origin = foreign_origin(load(None, {"team.controller": f"python {script}"}))
+    origin = foreign_origin(load(None, {"team.agent_command": f"python {script}"}))
     assert origin.startswith(f"python {script} ")

@@ -13,7 +13,7 @@ from quadriga.experiments.variants import parse_variants
 
 Said = pytest.CaptureFixture[str]
 
-SCENARIO = '[team]\nrobots = 1\n[world]\nterrain = "boxes"\nterrain_height = 0.03\nseconds = 0.5\n'
+SCENARIO = '[team]\nrobots = 1\n[world]\nterrain = "boxes"\nterrain_height = 0.03\nduration = 0.5\n'
 TUNING = """
 title = "Gains of one robot"
 scenarios = ["SCENARIO"]
@@ -77,7 +77,7 @@ def test_scenarios_of_several_lengths_are_refused(tmp_path: Path, capsys: Said) 
     file = tmp_path / "gains.toml"
     short, long = tmp_path / "short.toml", tmp_path / "long.toml"
     short.write_text(SCENARIO, encoding="utf-8")
-    long.write_text(SCENARIO.replace("seconds = 0.5", "seconds = 0.8"), encoding="utf-8")
+    long.write_text(SCENARIO.replace("duration = 0.5", "duration = 0.8"), encoding="utf-8")
     file.write_text(TUNING.replace("SCENARIO", f'{short}", "{long}'), encoding="utf-8")
     assert main(["tune", str(file), "--out", str(tmp_path / "out")]) == 2
-    assert "world.seconds of 0.5 and 0.8" in capsys.readouterr().err
+    assert "world.duration of 0.5 and 0.8" in capsys.readouterr().err

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from quadriga.shared.members import DOCTOR
+from quadriga.shared.messages import Message, plain
 from quadriga.shared.runtime.record import record
-from quadriga.shared.wire.messages import Message, plain
 
 # How far a process has come.
 STARTED: Final = "started"  # it is on the bus and has not announced itself

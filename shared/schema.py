@@ -8,8 +8,8 @@ from functools import cache
 from hashlib import sha256
 from typing import Any
 
-from quadriga.shared.wire.messages import Message
-from quadriga.shared.wire.topics import TABLE
+from quadriga.shared.messages import Message
+from quadriga.shared.topics import TABLE
 
 _PLAIN = {
     bool: "boolean",

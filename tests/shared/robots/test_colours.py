@@ -7,8 +7,8 @@ import re
 import numpy as np
 import pytest
 
-from quadriga.shared.robot.colours import N_ROBOT_COLOURS, robot_colour, robot_rgb
-from quadriga.shared.robot.conventions import Array
+from quadriga.shared.robots.colours import N_ROBOT_COLOURS, robot_colour, robot_rgb
+from quadriga.shared.robots.conventions import Array
 
 # What linear red, green and blue turn into: Machado, Oliveira and Fernandes (2009), severity 1.
 EYES = {

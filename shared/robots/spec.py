@@ -13,7 +13,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot.conventions import GRAVITY, N_LEGS, Array
+from quadriga.shared.robots.conventions import GRAVITY, N_LEGS, Array
 
 _FOLDED: Final = (0.0, 1.3, -2.6)  # rad: hip, thigh and calf of a leg that is folded
 _PACKAGE: Final = "cmeel.prefix/share/example-robot-data/robots"

@@ -97,7 +97,7 @@ EVENTS: Final[Mapping[str, EventCode]] = MappingProxyType(
         ),
         ROBOT_STOPPED: EventCode("fault", "a bridge has stopped its robot: damped, then passive"),
         CLOCK_OFF: EventCode("fault", "a plant's system clock is off by more than 1 ms"),
-        TIME_OVER: EventCode("stop", "the walk is over: world.seconds have passed"),
+        TIME_OVER: EventCode("stop", "the walk is over: world.duration have passed"),
         FALLEN: EventCode("stop", "the walk is over: a robot fell"),
         SIGNAL: EventCode("stop", "the walk is over: the world was told to stop"),
         STOPPED: EventCode("stop", "the walk is over: somebody has asked the team to stop"),

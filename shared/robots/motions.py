@@ -7,8 +7,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from quadriga.shared.robot.conventions import N_LEGS, Array
-from quadriga.shared.robot.spec import RobotSpec
+from quadriga.shared.robots.conventions import N_LEGS, Array
+from quadriga.shared.robots.spec import RobotSpec
 
 _UNDER: Final = 0.8  # rad by which a joint may be off a stand of some height, and the legs carry
 _BACKWARDS: Final = 1.5  # rad, thigh of a leg whose knee is behind its hip, and not below it

@@ -6,8 +6,8 @@ import msgpack
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quadriga.shared.wire.codec import MAX_INTEGER, MAX_TICK, encode, envelope
-from quadriga.shared.wire.messages import EStop, Event
+from quadriga.shared.codec import MAX_INTEGER, MAX_TICK, encode, envelope
+from quadriga.shared.messages import EStop, Event
 
 ticks = st.integers(0, MAX_TICK - 1)
 stamps = st.integers(0, MAX_INTEGER - 1)

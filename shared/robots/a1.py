@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from quadriga.shared.robot.spec import Geometry, RobotSpec
+from quadriga.shared.robots.spec import Geometry, RobotSpec
 
 _INERTIAL: Final = "link[@name='trunk']/inertial/"
 _LEGS: Final = (("FL", "", ""), ("FR", "", "-"), ("RL", "-", ""), ("RR", "-", "-"))  # signs of x, y

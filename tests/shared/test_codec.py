@@ -11,9 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from quadriga.shared.errors import MessageError
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.wire.codec import (
+from quadriga.shared.codec import (
     MAX_BYTES,
     MAX_INTEGER,
     MAX_TEXT,
@@ -22,8 +20,10 @@ from quadriga.shared.wire.codec import (
     encode,
     truncate_text,
 )
-from quadriga.shared.wire.messages import Command, Message, Plan, State, Status, Truth
-from quadriga.shared.wire.topics import TABLE
+from quadriga.shared.errors import MessageError
+from quadriga.shared.messages import Command, Message, Plan, State, Status, Truth
+from quadriga.shared.robots.conventions import Array
+from quadriga.shared.topics import TABLE
 
 TYPES = [topic.type for topic in TABLE]
 of_every_type = pytest.mark.parametrize("kind", TYPES, ids=lambda kind: kind.__name__)

@@ -9,10 +9,10 @@ from quadriga.shared import members
 from quadriga.shared.config.load import load
 from quadriga.shared.config.timing import max_ages, periods
 from quadriga.shared.errors import MessageError
+from quadriga.shared.messages import Flat, Message
+from quadriga.shared.messages_page import to_markdown
 from quadriga.shared.runtime.places import SOURCE
-from quadriga.shared.wire.markdown import to_markdown
-from quadriga.shared.wire.messages import Flat, Message
-from quadriga.shared.wire.topics import (
+from quadriga.shared.topics import (
     AGENT_EVENT,
     CONFIGURED,
     INJECTED,

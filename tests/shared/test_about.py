@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from quadriga.shared.about import ABOUT, About, scheduling_of, stage_of
 from quadriga.shared.bus.process_info import describe_process
+from quadriga.shared.codec import decode, encode
 from quadriga.shared.config.load import load
-from quadriga.shared.wire.about import ABOUT, About, scheduling_of, stage_of
-from quadriga.shared.wire.codec import decode, encode
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import xml.etree.ElementTree as ET
 
 import pinocchio as pin
 
-from quadriga.shared.robot.spec import RobotSpec
+from quadriga.shared.robots.spec import RobotSpec
 
 
 def build_pinocchio_model(robot: RobotSpec, *, rotors: bool = False) -> pin.Model:

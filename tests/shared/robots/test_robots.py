@@ -12,8 +12,8 @@ import pinocchio as pin
 import pytest
 
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robot.a1 import A1
-from quadriga.shared.robot.conventions import (
+from quadriga.shared.robots.a1 import A1
+from quadriga.shared.robots.conventions import (
     FOOT_FRAMES,
     GRAVITY,
     JOINT_NAMES,
@@ -25,9 +25,9 @@ from quadriga.shared.robot.conventions import (
     Leg,
     robot_names,
 )
-from quadriga.shared.robot.pinocchio_model import build_pinocchio_model
-from quadriga.shared.robot.robots import ROBOTS
-from quadriga.shared.robot.spec import RobotSpec
+from quadriga.shared.robots.pinocchio_model import build_pinocchio_model
+from quadriga.shared.robots.registry import ROBOTS
+from quadriga.shared.robots.spec import RobotSpec
 
 every_robot = pytest.mark.parametrize("robot", ROBOTS.values(), ids=ROBOTS.keys())
 

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadriga.shared.errors import MessageError
-from quadriga.shared.robot.conventions import Array
-from quadriga.shared.wire.messages import Flat, Message, cuts_of
+from quadriga.shared.messages import Flat, Message, cuts_of
+from quadriga.shared.robots.conventions import Array
 
 M = TypeVar("M", bound=Message)
 
@@ -108,7 +108,7 @@ def decode(payload: bytes, kind: type[M]) -> M:
 def envelope(payload: bytes) -> tuple[int, int] | None:
     """`(tick, stamp_ns)` of a message, or None if its bytes do not carry them.
 
-    Costs about 1 µs for bytes that `wire.codec.encode` wrote, and a full parse for any
+    Costs about 1 µs for bytes that `shared.codec.encode` wrote, and a full parse for any
     other order of the same fields. Nothing but these two fields is validated, as the codec would.
     """
     if payload[1:_TICK_AT] == _HEAD:
@@ -350,6 +350,6 @@ def _compiled_read() -> Read:
 
     Operator, recorder, router and emergency stop do not.
     """
-    from quadriga.shared.wire.flat_bytes import read_flat
+    from quadriga.shared.flat_bytes import read_flat
 
     return read_flat

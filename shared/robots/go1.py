@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from quadriga.shared.robot.spec import Geometry, RobotSpec
+from quadriga.shared.robots.spec import Geometry, RobotSpec
 
 GO1: Final = RobotSpec(
     kind="go1",

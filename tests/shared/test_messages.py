@@ -5,8 +5,8 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quadriga.shared.wire import codes
-from quadriga.shared.wire.messages import Event, format_event, parse_events
+from quadriga.shared import codes
+from quadriga.shared.messages import Event, format_event, parse_events
 
 PLAIN = st.text(st.characters(min_codepoint=32, max_codepoint=126), max_size=60)
 

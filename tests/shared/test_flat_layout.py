@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from quadriga.shared import codec
+from quadriga.shared.codec import decode, encode
 from quadriga.shared.errors import MessageError
-from quadriga.shared.wire import codec
-from quadriga.shared.wire.codec import decode, encode
-from quadriga.shared.wire.messages import Command, Measurement, Message, State
+from quadriga.shared.messages import Command, Measurement, Message, State
 
 TYPES = (State, Command, Measurement)
 of_every_type = pytest.mark.parametrize("kind", TYPES, ids=lambda kind: kind.__name__)

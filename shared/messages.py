@@ -16,10 +16,10 @@ from typing import Any, ClassVar, Final, Self, TypeVar, dataclass_transform
 
 import numpy as np
 
+from quadriga.shared.codes import EVENTS
 from quadriga.shared.printable import printable_line
-from quadriga.shared.robot.conventions import JOINT_NAMES, OUTPUTS, Array, Leg
+from quadriga.shared.robots.conventions import JOINT_NAMES, OUTPUTS, Array, Leg
 from quadriga.shared.runtime.record import record
-from quadriga.shared.wire.codes import EVENTS
 
 # Names of the entries of arrays, for readers that know nothing of this project.
 XYZ: Final = ("x", "y", "z")
@@ -282,7 +282,7 @@ class Event(Message):
     kind: str = plain(str, "push, payload, terrain, bridge, fault, fall, start or stop")
     robot: str = plain(str, "the robot concerned, or empty")
     detail: str = plain(str, "free text")
-    code: str = plain(str, "what happened, one of quadriga.shared.wire.codes.EVENTS")
+    code: str = plain(str, "what happened, one of quadriga.shared.codes.EVENTS")
 
     @classmethod
     def of(cls, tick: int, code: str, robot: str, detail: str) -> Event:

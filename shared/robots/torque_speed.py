@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from quadriga.shared.robot.conventions import N_LEGS, Array
-from quadriga.shared.robot.spec import RobotSpec
+from quadriga.shared.robots.conventions import N_LEGS, Array
+from quadriga.shared.robots.spec import RobotSpec
 from quadriga.shared.runtime.jit import compiled
 
 

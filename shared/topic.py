@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.members import ESTOP, LAUNCHER, ROLES
-from quadriga.shared.wire.messages import Message
+from quadriga.shared.messages import Message
 
 CONFIGURED: Final = -1  # a time that the configuration says: see `quadriga.shared.config.timing`
 GROUP: Final = "quadriga.topics"
@@ -21,7 +21,7 @@ _NAME: Final = re.compile(r"[A-Za-z0-9_.-]+(/[A-Za-z0-9_.-]+)*")
 _TAKERS: Final = frozenset({LAUNCHER, ESTOP, *(role.name for role in ROLES)})
 _ALONE: Final = (
     "the row stands in a module that imports no more of this project than "
-    "quadriga.shared.wire.topic and .messages"
+    "quadriga.shared.topic and .messages"
 )
 
 
@@ -91,9 +91,9 @@ def _load(entry: EntryPoint) -> Any:
 def _objection(row: Any, rows: Sequence[Topic]) -> tuple[str, str, str] | None:
     """What is wrong with a row beside those before it: got, expected, cause; None: nothing."""
     if not isinstance(row, Topic):
-        return repr(row)[:80], "a Topic of quadriga.shared.wire.topic", ""
+        return repr(row)[:80], "a Topic of quadriga.shared.topic", ""
     if not (isinstance(row.type, type) and issubclass(row.type, Message)):
-        return repr(row.type)[:80], "a Message of quadriga.shared.wire.messages", ""
+        return repr(row.type)[:80], "a Message of quadriga.shared.messages", ""
     if not _NAME.fullmatch(row.name) or row.name in {other.name for other in rows}:
         return repr(row.name), "a name of its own, such as 'wind' or 'weather/wind'", ""
     if row.type.__name__ in {other.type.__name__ for other in rows}:

@@ -1,7 +1,7 @@
 """The table of topics: key, message type, period, maximum age, who sends it and who takes it.
 
-What the entries of a message's arrays are called stands with its fields, in `wire.messages`. Other
-packages add rows of their own, see `wire.plugin_topics`.
+What the entries of a message's arrays are called stands with its fields, in `shared.messages`.
+Other packages add rows of their own, see `shared.topic.plugin_topics`.
 """
 
 from __future__ import annotations
@@ -9,12 +9,12 @@ from __future__ import annotations
 from typing import Final
 
 from quadriga.shared import members
+from quadriga.shared import messages as msg
 from quadriga.shared.errors import MessageError
 from quadriga.shared.members import AGENT, LAUNCHER, OPERATOR, PLANNER, SIM
-from quadriga.shared.wire import messages as msg
-from quadriga.shared.wire.topic import CONFIGURED as CONFIGURED
-from quadriga.shared.wire.topic import Topic as Topic
-from quadriga.shared.wire.topic import plugin_topics
+from quadriga.shared.topic import CONFIGURED as CONFIGURED
+from quadriga.shared.topic import Topic as Topic
+from quadriga.shared.topic import plugin_topics
 
 SAMPLE_MS: Final = 10  # one sample of u and y: forces are means over it, outputs taken at its end
 REFERENCE_EPOCH_MS: Final = 100  # the operator speaks at multiples of this

@@ -11,13 +11,13 @@ from pathlib import Path
 import pytest
 
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.wire.topic import plugin_topics
-from quadriga.shared.wire.topics import TABLE
+from quadriga.shared.topic import plugin_topics
+from quadriga.shared.topics import TABLE
 
 HEAD = """
 from quadriga.shared.runtime.record import record
-from quadriga.shared.wire.messages import Message, State, plain
-from quadriga.shared.wire.topic import Topic
+from quadriga.shared.messages import Message, State, plain
+from quadriga.shared.topic import Topic
 
 @record
 class Smell(Message):

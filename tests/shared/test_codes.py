@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from quadriga.shared.wire import codes
-from quadriga.shared.wire.codec import decode, encode
-from quadriga.shared.wire.messages import Event
+from quadriga.shared import codes
+from quadriga.shared.codec import decode, encode
+from quadriga.shared.messages import Event
 
 KINDS = {"start", "terrain", "payload", "push", "bridge", "fall", "fault", "stop"}
 

@@ -1,14 +1,14 @@
-"""The table of topics and their messages as a page: `python -m quadriga.shared.wire.markdown`."""
+"""The table of topics and their messages as a page: `python -m quadriga.shared.messages_page`."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import fields
 
-from quadriga.shared.wire.about import QUESTIONS
-from quadriga.shared.wire.messages import Message
-from quadriga.shared.wire.topic import CONFIGURED, Topic
-from quadriga.shared.wire.topics import TABLE
+from quadriga.shared.about import QUESTIONS
+from quadriga.shared.messages import Message
+from quadriga.shared.topic import CONFIGURED, Topic
+from quadriga.shared.topics import TABLE
 
 _HEAD = """\
 # Topics and messages
@@ -18,7 +18,7 @@ topic is one per robot, else `<team>/<topic>`; the planner and the sim server (o
 plant, `plant_r1` …) have a `status` under their own names. Every message also carries `tick` [ms]
 and `stamp_ns` [ns], the world's time of its content. Periods and ages are world time; the last
 column tells what is recorded.
-This page is generated: `python -m quadriga.shared.wire.markdown > docs/messages.md`.
+This page is generated: `python -m quadriga.shared.messages_page > docs/messages.md`.
 
 | topic | per robot | message | from | to | period | maximum age | recorded |
 |---|---|---|---|---|---|---|---|
