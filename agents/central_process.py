@@ -8,7 +8,6 @@ from typing import Final
 
 import numpy as np
 
-from quadriga.agents.announced_end import AnnouncedEnd
 from quadriga.agents.planner.qp_solver import SOLVED
 from quadriga.agents.planner.team_planner import TeamPlanner
 from quadriga.agents.planning.interface import REFUSED
@@ -93,13 +92,13 @@ class _CentralShell:
         self._references: list[Reference] = []
         self._measurements: list[tuple[str, Measurement]] = []
         self._counters: Counter[str] = Counter()
-        self._end = AnnouncedEnd()
+        self._ended = False  # the end of the walk has been announced
         self._tick = 0  # of the last plans
 
     def work(self, stopped: Callable[[], bool]) -> None:
         """Plan whenever a step is due until the walk is over."""
         state, since = CentralState(), monotonic()
-        while not (stopped() or self._lead.is_over(announced=self._end.awaited)):
+        while not (stopped() or self._lead.is_over(announced=self._ended)):
             packet = self._bus.get(POLL)
             if packet is None:
                 self._lead.poll(self._tick)
@@ -131,13 +130,9 @@ class _CentralShell:
         robot = self._robots.get(key)
         try:
             if robot is not None:
-                sample = decode(payload, Measurement)
-                self._measurements.append((robot, sample))
-                self._end.pass_tick(sample.tick)
+                self._measurements.append((robot, decode(payload, Measurement)))
             elif key.endswith(EVENT.name):
-                event = decode(payload, Event)
-                if event.kind == "stop":
-                    self._end.announce(event.tick, self._tick)
+                self._ended = self._ended or decode(payload, Event).kind == "stop"
             else:
                 reference = decode(payload, Reference)
                 if not is_within_limits(reference):

@@ -1,137 +1,237 @@
-"""What the robot is doing and why: the modes, their order, and the named reasons to leave them.
+"""When an agent's robot walks, stops, and walks again: the agent's part of `shared.modes`.
 
-stand → walk → stopping → stand; damping and estop are latched from anywhere. A robot that has been
-led down, or that the operator has released from one of these, begins anew: rising → stand.
+A robot that stands for a loss, or because somebody has asked for it, walks again at the begin of a
+half cycle, once all its inputs have been there for `team.resume_after`, if the operator has asked
+for it lately; after a loss also by itself, if the team is configured so. Then it follows the
+commanded speed in a ramp. A fault or an emergency stop lasts until the operator's reset.
+
+A robot does not walk while another one of its team does not: it would drag it along. In real time
+each robot hears every other's status ten times a second, and at once when its mode changes. In
+lock-step it does not: what it knew would depend on who was faster.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Final
 
-from quadriga.shared.codes import code_of
-from quadriga.shared.runtime.record import record
-
-STAND: Final = "stand"
-WALK: Final = "walk"
-STOPPING: Final = "stopping"
-RISING: Final = "rising"  # in place, after it has been down
-DAMPING: Final = "damping"
-ESTOP: Final = "estop"
-
-# Reasons for a safe stop that are losses of inputs, as a mode's reason begins.
-REFERENCE_LOST: Final = "reference-lost"  # the operator is silent
-WINDOW_LOST: Final = "window-lost"  # no plan of its own for as long as a peer may be silent
-PEER_LOST: Final = "peer-lost"  # no plan of a peer for that long
-PLANNER_LOST: Final = "planner-lost"  # no plan came for as long as a team waits for one
-LED_DOWN: Final = "led-down"  # its motors had no commands: the agent was away, or cut off
-IMU_LOST: Final = "imu-lost"  # its attitude is not known
-ENCODER_LOST: Final = "encoder-lost"  # the angle of a joint is not known
-LOSSES: Final = frozenset(
-    (REFERENCE_LOST, WINDOW_LOST, PEER_LOST, PLANNER_LOST, LED_DOWN, IMU_LOST, ENCODER_LOST)
+from quadriga.agents.step_io import Inputs
+from quadriga.shared.codes import (
+    HALTS,
+    INPUT_LOST,
+    RESUMED,
+    STANDS_AGAIN,
+    STANDS_UP,
+    code_of,
+    with_detail,
 )
+from quadriga.shared.config.sections import Config
+from quadriga.shared.messages import Event, Reference, Status
+from quadriga.shared.modes import (
+    COMMANDED,
+    ESTOP,
+    LOSSES,
+    PEER_LOST,
+    REFERENCE_LOST,
+    STAND,
+    STANDING_UP,
+    STOPPED,
+    STOPPING,
+    WALK,
+    Mode,
+    Stop,
+    next_mode,
+)
+from quadriga.shared.robots.conventions import robot_names
+from quadriga.shared.runtime.record import record
+from quadriga.shared.topics import REFERENCE
 
-# Reasons for which a robot stands because somebody has said so, and walks only when told to.
-STOPPED: Final = "stopped"  # somebody has asked the team to stop
-RESET: Final = "reset"  # the operator has released the emergency stop
-COMMANDED: Final = frozenset((STOPPED, RESET))
-
-# Reasons for which a robot is damped, until the operator releases it.
-NO_ESTIMATE: Final = "no-estimate"  # the orientation is not a number
-FALL: Final = "fall"  # the trunk is tilted beyond `controller.fall_tilt`
-NOT_UP: Final = "not-up"  # it got up, and does not stand
-
-PRECEDENCE: Final = (ESTOP, DAMPING, STOPPING)  # of the stops of one tick, the gravest first
-REASON_MOST: Final = 200  # characters of a reason; beyond 4096 no status could be read
-SLOW_DOWN_MS: Final = 500  # of a safe stop: speed goes to zero while the trot goes on
-
-
-@record
-class Mode:
-    """The present mode, since when, and the reason if it is not the normal course."""
-
-    name: str
-    since: int
-    reason: str = ""
-
-    @property
-    def passive(self) -> bool:
-        """Whether the joints are only damped."""
-        return self.name in (DAMPING, ESTOP)
-
-    def speed_factor(self, tick: int) -> float:
-        """Share of the commanded speed that is still followed."""
-        if self.name == WALK:
-            return 1.0
-        if self.name == STOPPING:
-            return max(0.0, 1.0 - (tick - self.since) / SLOW_DOWN_MS)
-        return 0.0
+REQUEST_MS: Final = 5000  # for which the operator's request to go on is obeyed
+RAMP_MS: Final = 1000  # from standing to the commanded speed
+SILENCE_MS: Final = 500  # without a status, after which a robot is lost
+GRACE_MS: Final = 1000  # for which robots that walk again may begin one after the other
+_LOOKED_BACK_MS: Final = 4000  # at most, from a tick to the oldest reference that still matters
 
 
 @record
-class Stop:
-    """A cause to leave the normal course: the mode it asks for (of `PRECEDENCE`) and why."""
+class Resume:
+    """What an agent remembers of its way back to walking, in ticks; −1: never.
 
-    mode: str
-    reason: str
+    Attributes:
+        inputs_ok_since: from when on it counts that all inputs are there.
+        requested: when the operator's request to go on came that is in force.
+        resumed: when the robot last began to walk again.
+        stopped: when somebody last asked the team to stop.
+    """
+
+    inputs_ok_since: int = -1
+    requested: int = -1
+    resumed: int = -1
+    stopped: int = -1
 
 
-def step_mode(mode: Mode, tick: int, stand_ms: int, half_cycle_ends: bool) -> Mode:
-    """The mode's normal course: start walking, finish a safe stop at the end of a stance."""
-    if mode.name == STAND and not mode.reason and tick >= stand_ms:
-        return Mode(WALK, tick)
-    if mode.name == STOPPING and half_cycle_ends and tick - mode.since >= SLOW_DOWN_MS:
-        return replace(mode, name=STAND)
-    return mode
+Statuses = Mapping[str, Status]  # the newest of each other robot that has spoken
 
 
-def resolve_stops(mode: Mode, tick: int, stops: Sequence[Stop]) -> Mode:
-    """The mode after all stops of one tick: the gravest counts, of equally grave ones the first.
+class ModeRules:
+    """Fixed data of when one robot changes its mode; what it gives depends on arguments alone.
 
     Args:
-        mode: of the normal course, see `step_mode`.
-        tick: the present one.
-        stops: in the order in which they came up.
+        config: the team's configuration.
+        robot: the robot's name.
     """
-    if not stops:
-        return mode
-    gravest = min(stops, key=lambda stop: PRECEDENCE.index(stop.mode))
-    if gravest.mode == STOPPING:
-        return stop_safely(mode, tick, gravest.reason)
-    return enter_passive(mode, tick, gravest.mode, gravest.reason)
+
+    def __init__(self, config: Config, robot: str) -> None:
+        self._peers = tuple(n for n in robot_names(config.team.robots) if n != robot)
+        self._hears_peers = config.world.mode == "realtime"
+        self._stand_ms, self._stance_ms = config.gait.stand_ms, config.gait.stance_ms
+        self._resumes_alone = config.team.auto_resume
+        self._resume_ms = round(1000 * config.team.resume_after)
+
+    def course(self, mode: Mode, resume: Resume, last: int, tick: int) -> tuple[Mode, Resume]:
+        """The mode if nothing stops the robot between the ticks `last` and `tick`."""
+        if mode.name == WALK:
+            return mode, resume
+        stance_ends = self._half_cycle(last) != self._half_cycle(tick)
+        if stance_ends and self._can_resume(mode, resume, tick):
+            return Mode(WALK, tick), replace(resume, resumed=tick)
+        return next_mode(mode, tick, self._stand_ms, stance_ends), resume
+
+    def _half_cycle(self, tick: int) -> int:
+        return (tick - self._stand_ms) // self._stance_ms
+
+    def _can_resume(self, mode: Mode, resume: Resume, tick: int) -> bool:
+        if mode.name != STAND or not mode.may_resume or resume.inputs_ok_since < 0:
+            return False
+        requested = resume.requested >= 0 and tick - resume.requested <= REQUEST_MS
+        alone = self._resumes_alone and code_of(mode.reason) in LOSSES
+        return (alone or requested) and tick - resume.inputs_ok_since >= self._resume_ms
+
+    def stops(
+        self, mode: Mode, inputs: Inputs, statuses: Statuses, reference_age: int
+    ) -> list[Stop]:
+        """What asks a robot to stop, of all that arrived, or did not.
+
+        Args:
+            mode: of the normal course.
+            inputs: of this tick.
+            statuses: of the others.
+            reference_age: of the operator's reference in force, ms.
+        """
+        stops: list[Stop] = []
+        if inputs.estop is not None:
+            stops.append(Stop(ESTOP, with_detail(ESTOP, inputs.estop.reason)))
+        if inputs.stop is not None:
+            stops.append(Stop(STOPPING, with_detail(STOPPED, inputs.stop.reason)))
+        if mode.name != WALK:
+            return stops
+        if reference_age > REFERENCE.max_age_ms:
+            stops.append(Stop(STOPPING, REFERENCE_LOST))
+        tick = inputs.state.tick
+        lost = [name for name, s in statuses.items() if _has_stopped(s, tick, mode.since)]
+        if lost:
+            stops.append(Stop(STOPPING, with_detail(PEER_LOST, ",".join(sorted(lost)))))
+        return stops
+
+    def peers_ready(self, statuses: Statuses, tick: int) -> bool:
+        """Whether all others stand and may walk again, or walk already."""
+        return not self._hears_peers or all(
+            name in statuses and _can_walk(statuses[name], tick) for name in self._peers
+        )
+
+    def peers_rest(self, statuses: Statuses, tick: int, since: int) -> bool:
+        """Whether no other robot walks, as far as is known; after a while nobody is waited for.
+
+        Args:
+            statuses: of the others.
+            tick: the present one.
+            since: from when on they could be heard.
+        """
+        recent = [s for s in statuses.values() if tick - s.tick <= SILENCE_MS and s.tick > since]
+        if any(status.mode in (WALK, STOPPING) for status in recent):
+            return False
+        return len(recent) == len(self._peers) or tick - since > GRACE_MS
+
+    def remember(self, resume: Resume, mode: Mode, inputs: Inputs, *, inputs_ok: bool) -> Resume:
+        """What is remembered after a tick.
+
+        Requests are sent several times, and may come late: one to go on that was made before a
+        stop, or at the same tick, counts no more.
+
+        Args:
+            resume: before it.
+            mode: after it.
+            inputs: of this tick.
+            inputs_ok: whether all inputs of a robot that stands are there. The time is counted
+                from the next half cycle, so that robots go on together.
+        """
+        tick, stopped = inputs.state.tick, resume.stopped
+        # Who did not know the time wrote 0; nobody can know one that is still to come.
+        if inputs.stop is not None:
+            stopped = max(stopped, min(inputs.stop.tick or tick, tick))
+        if not mode.may_resume:
+            after = Resume(resumed=resume.resumed, stopped=stopped)
+            return resume if after == resume else after
+        since = -1
+        if inputs_ok:
+            next_half_cycle = tick + self._stance_ms - (tick - self._stand_ms) % self._stance_ms
+            since = resume.inputs_ok_since if resume.inputs_ok_since >= 0 else next_half_cycle
+        requested = -1 if inputs.stop is not None else resume.requested
+        if inputs.resume is not None and inputs.resume.tick > stopped:
+            requested = tick
+        return Resume(since, requested, resume.resumed, stopped)
 
 
-def rests(mode: Mode) -> bool:
-    """Whether a robot stands, slows down or gets up, and may walk again later."""
-    return mode.name in (STAND, STOPPING, RISING) and code_of(mode.reason) in LOSSES | COMMANDED
+def newest_statuses(known: Statuses, arrived: Iterable[tuple[str, Status]]) -> Statuses:
+    """The newest status of each robot; of several that arrived at once the last counts."""
+    newest = dict(arrived)
+    return {**known, **newest} if newest else known
 
 
-def is_commanded(reason: str) -> bool:
-    """Whether a robot stopped, or is damped, because somebody has said so."""
-    return code_of(reason) in COMMANDED | {ESTOP}
+def ramp(references: tuple[Reference, ...], resume: Resume, tick: int) -> tuple[Reference, ...]:
+    """The operator's references as a robot follows them that has begun to walk again.
 
-
-def stop_safely(mode: Mode, tick: int, reason: str) -> Mode:
-    """Slow down and stand, unless something graver is in force already.
-
-    What somebody has asked for takes the place of a loss: a robot goes on by itself after none.
+    Nothing is asked of it for the time before, and then a rising share of the speed.
     """
-    reason = reason[:REASON_MOST]
-    if mode.name == WALK:
-        return Mode(STOPPING, tick, reason)
-    if mode.name == STAND and not mode.reason:
-        return Mode(STAND, tick, reason)
-    if rests(mode) and code_of(mode.reason) in LOSSES and code_of(reason) in COMMANDED:
-        return replace(mode, reason=reason)
-    return mode
+    begun = resume.resumed
+    if begun < 0 or tick - begun > RAMP_MS + _LOOKED_BACK_MS:
+        return references
+    return tuple(_share(item, min(1.0, max(0, item.tick - begun) / RAMP_MS)) for item in references)
 
 
-def enter_passive(mode: Mode, tick: int, name: str, reason: str) -> Mode:
-    """Damp the joints; an emergency stop outranks a fault, the first reason stays.
+def _share(item: Reference, share: float) -> Reference:
+    if share == 1.0:
+        return item
+    return replace(item, vx=share * item.vx, vy=share * item.vy, wz=share * item.wz)
 
-    Of a long reason, which anyone may send, the first `REASON_MOST` characters are kept.
-    """
-    if mode.name == ESTOP or (mode.passive and name == DAMPING):
-        return mode
-    return Mode(name, tick, reason[:REASON_MOST])
+
+def change_event(before: Mode, after: Mode, tick: int, robot: str) -> Event | None:
+    """What an agent announces of a change of its mode: why it stops, and its way back."""
+    if after.name == STANDING_UP and before.name != STANDING_UP:
+        return Event.of(tick, STANDS_UP, robot, f"stands up where it is: {after.reason}")
+    if before.name == STANDING_UP and after.name == STAND:
+        return Event.of(tick, STANDS_AGAIN, robot, f"stands after {tick - before.since} ms")
+    if after.may_resume and not before.reason:
+        code = HALTS if code_of(after.reason) in COMMANDED else INPUT_LOST
+        return Event.of(tick, code, robot, f"slows down and stands: {after.reason}")
+    if after.name == WALK and before.may_resume:
+        return Event.of(tick, RESUMED, robot, f"walks again after {before.reason}")
+    return None
+
+
+def _has_stopped(status: Status, tick: int, since: int) -> bool:
+    """Whether another robot is silent or does not walk, to one that walks since a tick."""
+    if tick - status.tick > SILENCE_MS:
+        return True
+    if status.mode in (STAND, STOPPING):
+        return bool(status.reason) and status.tick > since + GRACE_MS
+    return status.mode != WALK
+
+
+def _can_walk(status: Status, tick: int) -> bool:
+    if tick - status.tick > SILENCE_MS:
+        return False
+    if status.mode == STAND:
+        return not status.reason or Mode(STAND, status.tick, status.reason).may_resume
+    return status.mode == WALK

@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Final
 
 from quadriga.agents.agent import Agent
 from quadriga.agents.inbox.inbox import Inbox
 from quadriga.agents.planner.team_planner import Collected
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.predictor.store import predictor_sha256
+from quadriga.agents.rehearsal import rehearse
 from quadriga.agents.shell import answer_states
-from quadriga.agents.tick_cost import rehearse_in_time
-from quadriga.shared.bus.discovery import STARTS
+from quadriga.shared.bus.endpoint import is_loopback
 from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import ProcessError
 from quadriga.shared.runtime.blas import use_one_blas_thread
-from quadriga.shared.runtime.clock import monotonic_ns
+from quadriga.shared.runtime.clock import monotonic_ns, thread_ns
 from quadriga.shared.runtime.collector import end_collection
+from quadriga.shared.runtime.scheduling import count_cores
 from quadriga.shared.runtime.signals import stop_on_signals
+
+_TICKS: Final = 200  # the last ones of a rehearsal: all that is loaded or compiled has been
+_TICK_MS: Final = 1.0  # what there is for a tick in real time
 
 
 def run(
@@ -27,9 +33,6 @@ def run(
     collected: Collected | None = None,
 ) -> None:
     """Walk one robot until the walk ends or it is stopped.
-
-    In real time an agent that is started while its team walks takes its robot over: it gets it up
-    where it is.
 
     Args:
         config: the team's configuration.
@@ -47,11 +50,45 @@ def run(
     use_one_blas_thread()
     agent = Agent(config, robot, predictor, monotonic_ns, collected)
 
-    def rehearse(joined: str) -> None:
-        rehearsed = Agent(config, robot, predictor, collected=collected)
-        rehearse_in_time(config, rehearsed, refuse=joined == STARTS)
+    def rehearse() -> None:
+        rehearse_in_time(config, Agent(config, robot, predictor, collected=collected))
         end_collection()
 
     inbox = Inbox(config, robot, agent.peers)
     sha256 = "" if predictor is None else predictor_sha256(predictor)
     answer_states(config, agent, inbox, stopped, rehearse, sha256)
+
+
+def rehearse_in_time(config: Config, agent: Agent) -> None:
+    """Rehearse; in real time, with `runtime.check_cpu`, refuse a computer that cannot keep up.
+
+    Of a walk in real time the agents are a part only. So a computer that is refused cannot keep up
+    for sure; one that is not may still be too slow. A first rehearsal may have compiled something,
+    so a second one decides.
+
+    Raises:
+        ProcessError: the processor time of a tick is more than there is for it.
+    """
+    cost_ms = _measure(config, agent)
+    if config.world.mode != "realtime" or not config.runtime.check_cpu:
+        return
+    agents, cores = config.team.robots if is_loopback(config.bus.endpoint) else 1, count_cores()
+    has_ms = _TICK_MS * min(1.0, cores / agents)  # a tick is one thread's work
+    if cost_ms > has_ms:
+        cost_ms = _measure(config, agent)
+    if cost_ms > has_ms:
+        shared = f"{agents} agents on {cores} cores" if agents > 1 else "one agent"
+        raise ProcessError(
+            f"{agent.robot} in real time",
+            f"{cost_ms:.2f} ms of processor time for a tick",
+            f"at most {has_ms:.2f} ms, of {shared}",
+            "too slow a computer: --mode lockstep waits for it; runtime.check_cpu = false tries",
+        )
+
+
+def _measure(config: Config, agent: Agent) -> float:
+    """Processor time of a tick in a rehearsal, ms; that of others does not count."""
+    ends: list[int] = []
+    rehearse(config, agent, lambda: ends.append(thread_ns()))
+    ticks = min(_TICKS, len(ends) - 1)
+    return 1e-6 * (ends[-1] - ends[-1 - ticks]) / ticks

@@ -6,6 +6,7 @@ First calls compile, load and allocate; they must not fall into the first steps 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Final
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from quadriga.shared.robots.conventions import GRAVITY, N_JOINTS, N_LEGS, N_OUTP
 from quadriga.shared.robots.spec import RobotSpec
 from quadriga.shared.topics import REFERENCE_EPOCH_MS, SAMPLE_MS
 
-_LEAN = 0.8  # of the tilt that is a fall
+_LEAN: Final = 0.8  # of the tilt that is a fall
 
 
 def rehearse(config: Config, agent: Agent, note: Callable[[], None] = lambda: None) -> AgentState:

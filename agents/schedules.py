@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from quadriga.agents.controller.schedule import Schedule
 from quadriga.agents.gait import half_cycle_stance, stance_progress
-from quadriga.agents.modes import STOPPING, WALK, Mode
 from quadriga.shared.config.sections import Config
+from quadriga.shared.modes import STOPPING, WALK, Mode
 
 _STANDING = Schedule(half_cycle_stance(-1).astype(float), 0.5, -1)
 

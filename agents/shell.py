@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Generic, Protocol, TypeVar
 
-from quadriga.agents.healing import change_event
 from quadriga.agents.inbox.inbox import Inbox, Source
 from quadriga.agents.inbox.intake_log import Intake
-from quadriga.agents.modes import Mode
+from quadriga.agents.modes import change_event
 from quadriga.agents.planning.interface import NOTHING, Expected
 from quadriga.agents.step_io import Inputs, Outputs
 from quadriga.agents.telemetry import Telemetry
@@ -19,6 +18,7 @@ from quadriga.shared.bus.session import HERE, POLL, READY, Bus
 from quadriga.shared.codec import encode
 from quadriga.shared.config.sections import Config
 from quadriga.shared.messages import State
+from quadriga.shared.modes import Mode
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns
 from quadriga.shared.runtime.scheduling import at_work
 from quadriga.shared.runtime.signals import interruptible
@@ -69,7 +69,7 @@ def answer_states(
     agent: SteppedAgent[S],
     inbox: Inbox,
     stopped: Callable[[], bool],
-    rehearse: Callable[[str], None],
+    rehearse: Callable[[], None],
     predictor_sha256: str = "",
 ) -> None:
     """Be a robot's agent on the bus until the walk ends or it is stopped.
@@ -79,13 +79,12 @@ def answer_states(
         agent: answers the states.
         inbox: what reaches it.
         stopped: asked often whether to stop.
-        rehearse: called once all are there, with how this process has joined them: `STARTS` or
-            `REJOINS`. A stop interrupts it.
+        rehearse: called once all are there. A stop interrupts it.
         predictor_sha256: digest of the predictor that it plans with; "": none.
 
     Raises:
         BusError: the bus cannot be opened, or the team is not complete in time, has something
-            else in common, or walks already in lock-step.
+            else in common, or walks already.
         ProcessError: who drives time, or the link to the router, has vanished.
         KeyboardInterrupt: it is stopped before it is ready.
     """
@@ -93,11 +92,10 @@ def answer_states(
         for key in inbox.keys:
             bus.subscribe(key)
         info = ProcessInfo(bus, config, predictor_sha256)
-        joined = join(bus, config, stopped, info, rejoins=True)
-        if not joined:
+        if not join(bus, config, stopped, info):
             return
         with interruptible(stopped):
-            rehearse(joined)
+            rehearse()
         shell = AgentShell(config, agent, inbox, bus)
         with at_work(config.runtime.priority):
             bus.declare(READY)

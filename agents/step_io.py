@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from quadriga.shared.messages import (
     Command,
     EStop,
-    Event,
     Measurement,
     Plan,
     Reference,
@@ -32,11 +31,10 @@ class Inputs:
         plans: plans of peers, or of whoever plans for the robot, with the sender's name.
         references: of the operator.
         estop: an emergency stop, if one came.
-        stop: somebody's wish that the team slow down and stand, if it came.
+        stop: somebody's request that the team slow down and stand, if it came.
         reset: the operator's release of an emergency stop, if it came.
-        resume: the operator's word to go on, if it came.
+        resume: the operator's request to go on, if it came.
         statuses: of the other robots, with their names.
-        events: of the plant: commands of a robot, or the operator, no longer come, or do again.
         truth: of the simulator, only for the estimator "truth".
         excitation: force deviation to add, (12,), N, yaw frame; data collection only.
     """
@@ -52,17 +50,16 @@ class Inputs:
     reset: Reset | None = None
     resume: Resume | None = None
     statuses: tuple[tuple[str, Status], ...] = ()
-    events: tuple[Event, ...] = ()
 
     @property
     def bare(self) -> bool:
         """Whether nothing but the state has come."""
-        others = self.measurements or self.plans or self.references or self.statuses or self.events
-        return not (others or any(self.words)) and self.truth is None
+        others = self.measurements or self.plans or self.references or self.statuses
+        return not (others or any(self.requests)) and self.truth is None
 
     @property
-    def words(self) -> tuple[EStop | SafeStop | Reset | Resume | None, ...]:
-        """What people have said, in the order of `shared.topics.WORDS`."""
+    def requests(self) -> tuple[EStop | SafeStop | Reset | Resume | None, ...]:
+        """What people have asked for, in the order of `shared.topics.REQUESTS`."""
         return self.estop, self.stop, self.reset, self.resume
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from quadriga.agents.controller.controller import Task
-from quadriga.agents.modes import WALK, Mode
 from quadriga.agents.planning.active_plan import Setpoint
 from quadriga.shared.config.sections import Config
 from quadriga.shared.messages import Reference
+from quadriga.shared.modes import WALK, Mode
 from quadriga.shared.robots.conventions import Array
 
 _ZERO = np.zeros(12)

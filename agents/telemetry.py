@@ -7,9 +7,9 @@ from typing import Final
 
 import numpy as np
 
-from quadriga.agents.modes import WALK
 from quadriga.agents.step_io import Outputs
 from quadriga.shared.messages import Status
+from quadriga.shared.modes import WALK
 from quadriga.shared.runtime.histogram import Histogram
 
 PERIOD_MS: Final = 100

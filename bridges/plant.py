@@ -180,11 +180,11 @@ class RobotPlant(Plant):
             CheckError: it stopped, or does not stand when it should.
         """
         before, left = self.mode, self._left_ms
-        while self.mode is not BridgeMode.STANDING:
+        while self.mode is not BridgeMode.STAND:
             if stopped():
                 return False
             left -= 1
-            if self.mode is BridgeMode.STOPPED or left < 0:
+            if self.mode is BridgeMode.ESTOP or left < 0:
                 what = f"robot {self._name}: {BridgeMode.STANDING_UP}"
                 got = self.supervision.reason or f"{self.mode} for too long"
                 raise CheckError(what, got, "a robot that stands")
@@ -289,7 +289,7 @@ class RobotPlant(Plant):
             if arrived is not None:
                 self._answers.add(1e3 * (self._clock() - arrived))
         changes = [*supervised.changes]
-        if self.now >= self._warn_at and self.mode is not BridgeMode.STOPPED:
+        if self.now >= self._warn_at and self.mode is not BridgeMode.ESTOP:
             warning = self._supervisor.warning(report)
             self._warn_at = self.now + _WARN_MS[bool(warning)]
             changes += [(self.mode, warning)] if warning else []
@@ -315,7 +315,7 @@ class RobotPlant(Plant):
         self._driver.close()
 
     def _come_to_rest(self) -> None:
-        resting = (BridgeMode.DRY, BridgeMode.PASSIVE, BridgeMode.STOPPED)
+        resting = (BridgeMode.DRY, BridgeMode.PASSIVE, BridgeMode.ESTOP)
         rate, before, left = Rate(TICK), self.mode, self._left_ms
         while self.mode not in resting and left > 0:
             self.turn(Request.LIE)
@@ -324,7 +324,7 @@ class RobotPlant(Plant):
                 before, left = self.mode, self._left_ms
             left -= 1
         passive = round(1000 * self._config.bridge.passive_s)
-        for _ in range(_LEAVE_MS + (passive if self.mode is BridgeMode.STOPPED else 0)):
+        for _ in range(_LEAVE_MS + (passive if self.mode is BridgeMode.ESTOP else 0)):
             self.turn(Request.REST)
             rate.wait()
 
@@ -391,7 +391,7 @@ class RobotPlant(Plant):
     def _event(self, at: int, mode: BridgeMode, reason: str) -> Event:
         ms_ago, text = self.now - at, f"{mode} {reason}".rstrip()
         text += f", {ms_ago / 1000:.1f} s before the walk" if ms_ago else ""
-        code = codes.ROBOT_STOPPED if mode is BridgeMode.STOPPED else codes.BRIDGE_MODE
+        code = codes.ROBOT_STOPPED if mode is BridgeMode.ESTOP else codes.BRIDGE_MODE
         return Event.of(self.tick, code, self._name, text)
 
 

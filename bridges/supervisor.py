@@ -34,6 +34,7 @@ from quadriga.bridges.postures import (
     towards,
     tracking_error,
 )
+from quadriga.shared import modes
 from quadriga.shared.codes import with_detail
 from quadriga.shared.config.bridge import BridgeConfig
 from quadriga.shared.messages import Command
@@ -55,17 +56,17 @@ _RELEASING: Final = 1.0  # s, for which a robot that has lain down is damped
 
 
 class BridgeMode(StrEnum):
-    """What a bridge does with its robot."""
+    """What a bridge does with its robot: modes of `shared.modes`, and three of its own."""
 
     DRY = "dry"  # no motor is ever enabled
-    PASSIVE = "passive"  # motors off
-    STANDING_UP = "standing-up"
-    STANDING = "standing"
-    WALKING = "walking"  # the agent's commands, limited
-    LYING_DOWN = "lying-down"
+    PASSIVE = modes.PASSIVE  # motors off
+    STANDING_UP = modes.STANDING_UP
+    STAND = modes.STAND
+    WALK = modes.WALK  # the agent's commands, limited
+    LYING_DOWN = modes.LYING_DOWN
     TESTING = "testing"  # it hangs, and one joint after the other moves a little
     RELEASING = "releasing"  # damped, then passive
-    STOPPED = "stopped"  # damped, then motors off, until the bridge is started again
+    ESTOP = modes.ESTOP  # damped, then motors off, until the bridge is started again
 
 
 class Request(StrEnum):
@@ -78,12 +79,12 @@ class Request(StrEnum):
     TEST = "test"
 
 
-_UPRIGHT: Final = (BridgeMode.STANDING_UP, BridgeMode.STANDING, BridgeMode.WALKING)
+_UPRIGHT: Final = (BridgeMode.STANDING_UP, BridgeMode.STAND, BridgeMode.WALK)
 BY_REQUEST: Final[Mapping[tuple[BridgeMode, Request], BridgeMode]] = MappingProxyType(
     {
         (BridgeMode.PASSIVE, Request.STAND): BridgeMode.STANDING_UP,
         (BridgeMode.PASSIVE, Request.TEST): BridgeMode.TESTING,
-        (BridgeMode.STANDING, Request.WALK): BridgeMode.WALKING,
+        (BridgeMode.STAND, Request.WALK): BridgeMode.WALK,
         **{(mode, Request.LIE): BridgeMode.LYING_DOWN for mode in _UPRIGHT},
         **{(BridgeMode.TESTING, request): BridgeMode.RELEASING for request in Request},
         (BridgeMode.TESTING, Request.TEST): BridgeMode.TESTING,
@@ -93,7 +94,7 @@ BY_REQUEST: Final[Mapping[tuple[BridgeMode, Request], BridgeMode]] = MappingProx
 
 BY_ITSELF: Final[Mapping[BridgeMode, BridgeMode]] = MappingProxyType(
     {
-        BridgeMode.STANDING_UP: BridgeMode.STANDING,
+        BridgeMode.STANDING_UP: BridgeMode.STAND,
         BridgeMode.LYING_DOWN: BridgeMode.RELEASING,
         BridgeMode.TESTING: BridgeMode.RELEASING,
         BridgeMode.RELEASING: BridgeMode.PASSIVE,
@@ -218,17 +219,17 @@ class Supervisor:
 
     def _change(self, state: SupervisorState, inputs: SupervisorInputs) -> SupervisorState:
         """The state with the mode of this millisecond."""
-        if state.mode is BridgeMode.STOPPED:
+        if state.mode is BridgeMode.ESTOP:
             return state
         if reason := self.reason_to_stop(state, inputs):
-            return _begin(state, BridgeMode.STOPPED, inputs.now, reason)
+            return _begin(state, BridgeMode.ESTOP, inputs.now, reason)
         if state.mode is BridgeMode.TESTING and (
             joint := tracking_error(inputs.report.q, self._posture(state, inputs)[0])
         ):
             reason = with_detail(TRACKING_ERROR, joint)
-            return _begin(state, BridgeMode.STOPPED, inputs.now, reason)
+            return _begin(state, BridgeMode.ESTOP, inputs.now, reason)
         mode = BY_REQUEST.get((state.mode, inputs.request), state.mode)
-        if mode is BridgeMode.WALKING and not self._is_fresh(inputs):
+        if mode is BridgeMode.WALK and not self._is_fresh(inputs):
             return state
         if mode is state.mode and self._is_over(state, inputs):
             mode = BY_ITSELF.get(mode, mode)
@@ -276,7 +277,7 @@ class Supervisor:
             return ""
         if inputs.report_age > config.report_max_ms:
             return with_detail("report-late", f"{inputs.report_age} ms")
-        if mode is BridgeMode.WALKING and inputs.command_age > config.damp_ms:
+        if mode is BridgeMode.WALK and inputs.command_age > config.damp_ms:
             return with_detail("command-late", f"{inputs.command_age} ms")
         if state.fast_ms > config.speed_ms:
             shares = self._shares_of_speed(report)
@@ -321,12 +322,12 @@ class Supervisor:
         match state.mode:
             case BridgeMode.PASSIVE:
                 return state, passive(q)
-            case BridgeMode.STOPPED:
+            case BridgeMode.ESTOP:
                 off = inputs.now - state.since > 1000.0 * self._config.passive_s
                 return state, passive(q) if off else damped(q, self._servo)
-            case BridgeMode.WALKING:
+            case BridgeMode.WALK:
                 return self._follow(state, inputs)
-            case BridgeMode.STANDING:
+            case BridgeMode.STAND:
                 return state, self._hold(self._robot.q_stand)
             case BridgeMode.RELEASING:
                 return state, damped(q, self._servo, SINKING)
@@ -351,9 +352,9 @@ class Supervisor:
         """The agent's command, or the joints held where they were when it became late."""
         command = inputs.command
         if command is not None and self._is_fresh(inputs):
-            modes = np.full(N_JOINTS, self._servo, dtype=np.uint8)
+            servos = np.full(N_JOINTS, self._servo, dtype=np.uint8)
             targets = MotorTargets(
-                modes, command.q_des, command.v_des, command.tau, command.kp, command.kd
+                servos, command.q_des, command.v_des, command.tau, command.kp, command.kd
             )
             return (state if state.held is None else replace(state, held=None)), targets
         if state.held is None:

@@ -1,4 +1,4 @@
-"""Commands as they arrive at the plant: decoded, checked, the newest kept, the rest counted.
+"""Commands as they arrive at the plant: decoded, checked, aged; late ones are held, then lost.
 
 Every finite number passes the wire. A gain of 1e300 makes the sum that a motor forms infinite minus
 infinite, which is no number, and then the whole world that it moves is none. So none beyond the
@@ -9,14 +9,15 @@ that is within them.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from quadriga.shared.codec import decode, encode
+from quadriga.shared.config.world import WorldConfig
 from quadriga.shared.errors import MessageError
-from quadriga.shared.messages import Command
+from quadriga.shared.messages import Command, State
 from quadriga.shared.robots.conventions import N_JOINTS, Array
 from quadriga.shared.robots.spec import RobotSpec
 from quadriga.shared.topics import COMMAND
@@ -26,6 +27,11 @@ MOST_KD: Final = 30.0  # N·m·s/rad
 # What is asked for may exceed what the robot can do: motors and bridges cut that off.
 _TIMES: Final = 2.0  # times the greatest torque, and the greatest speed
 _BEYOND: Final = 1.0  # rad beyond the joint's range
+PROMPT_TICKS: Final = 10  # for which commands must be prompt after one was late
+MOST_HELD_MS: Final = 1000  # then commands are as good as lost: yokes tip over who is held
+MOTOR_DAMPING: Final = 2.0  # N·m·s/rad, damping of a motor without a command
+_HOLD_KP: Final = 80.0  # N·m/rad, carries a standing robot
+_HOLD_KD: Final = 3.0  # N·m·s/rad
 
 
 class CommandLimits(NamedTuple):
@@ -133,3 +139,76 @@ class CommandBox:
         self._invalid[robot] += 1
         self.errors[robot] = self._whys[robot] = error
         return ""
+
+
+class CommandTimeout:
+    """What one robot's motors follow in real time: its command, or its joints held, until lost.
+
+    Over a link that takes about as long as a command may be old, its age dithers about that limit.
+    The motors would change to and fro between holding a posture and torques that belong to another
+    one. So they hold until commands have been younger than half the limit for some ticks.
+
+    Args:
+        world: the limits.
+        first_ms: until then no first command is missed.
+
+    Attributes:
+        held: the command that holds the joints; None: the motors follow the robot's.
+    """
+
+    def __init__(self, world: WorldConfig, first_ms: int) -> None:
+        self._hold_ms, self._lost_ms = world.command_hold_ms, world.command_damp_ms
+        self._first_ms = max(first_ms, self._lost_ms)
+        self._prompt = self._held_ms = 0
+        self.held: Command | None = None
+
+    def choose(
+        self,
+        command: Command | None,
+        tick: int,
+        states: Callable[[], Mapping[str, State]],
+        robot: str,
+    ) -> Command:
+        """What the motors follow at a tick.
+
+        Args:
+            command: the robot's newest; None before its first.
+            tick: the present one.
+            states: gives what robots measure at this tick.
+            robot: whose command it is.
+        """
+        age = self._age(command, tick)
+        self._prompt = self._prompt + 1 if 2 * age <= self._hold_ms else 0
+        follows = age <= self._hold_ms and (self.held is None or self._prompt >= PROMPT_TICKS)
+        if command is not None and follows:
+            self.held, self._held_ms = None, 0
+            return command
+        self._held_ms += command is not None
+        self.held = self.held or hold_joints(states()[robot])
+        return self.held
+
+    def describe_loss(self, command: Command | None, tick: int) -> str:
+        """Why a robot's commands count as lost at a tick; "": they do not."""
+        age = self._age(command, tick)
+        if age > (self._first_ms if command is None else self._lost_ms):
+            return f"silent for {age} ms"
+        if self._held_ms > MOST_HELD_MS:
+            return f"late for {self._held_ms} ms"
+        return ""
+
+    @staticmethod
+    def _age(command: Command | None, tick: int) -> int:
+        return tick - (-1 if command is None else command.tick)
+
+
+def hold_joints(state: State) -> Command:
+    """The command that holds the joints where they are measured in `state`."""
+    zero = np.zeros(N_JOINTS)
+    kp, kd = np.full(N_JOINTS, _HOLD_KP), np.full(N_JOINTS, _HOLD_KD)
+    return Command(state.tick, state.stamp_ns, zero, state.q_joint, zero, kp, kd)
+
+
+def damp_joints(tick: int) -> Command:
+    """The command of a tick that damps all joints, as motors without a command are damped."""
+    zero = np.zeros(N_JOINTS)
+    return Command(tick, tick * 1_000_000, zero, zero, zero, zero, np.full(N_JOINTS, MOTOR_DAMPING))

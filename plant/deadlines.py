@@ -17,7 +17,6 @@ DUE: Final = "due"  # ends the name of a counter, behind a robot's name: see `De
 LATE_COUNT: Final = "late"
 LATE: Final = ""
 HELD: Final = "held"
-DAMPED: Final = "damped"
 _BIN_MS: Final = 0.02
 
 
@@ -26,8 +25,8 @@ class Deadlines:
 
     Attributes:
         late: number of ticks by robot and grade: `LATE` counts every tick without a command of
-            that tick, `HELD` and `DAMPED` those of them at which the motors held or were damped.
-            Of a robot that takes commands every other tick, only those count.
+            that tick, `HELD` those at which the motors held the joints. Of a robot that takes
+            commands every other tick, only those count.
     """
 
     def __init__(self, names: Iterable[str]) -> None:
@@ -57,8 +56,8 @@ class Deadlines:
         """The report, as sent on `<team>/sim/status`.
 
         `ages_ms` holds median, p99 and max of `<robot>.command` and of the world's own `jitter`;
-        counters are `<robot>.due` (ticks at which it takes a command), `.late`, `.held`, `.damped`,
-        `ticks` and `overruns`; `tick_us` holds the lateness of each tick since the last status.
+        counters are `<robot>.due` (ticks at which it takes a command), `.late`, `.held`, `ticks`
+        and `overruns`; `tick_us` holds the lateness of each tick since the last status.
         """
         ages: dict[str, float] = self._jitter.quantiles("jitter")
         for robot, histogram in self._ages.items():

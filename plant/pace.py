@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
 
-from quadriga.plant.end import End
+from quadriga.plant.protocol import End
 from quadriga.shared import codes
 from quadriga.shared.about import ABOUT
 from quadriga.shared.bus.diagnostics import CLOCK_REMEDY, PACE_LIMIT, ClockOffset, MemberAnswer

@@ -6,14 +6,13 @@ from collections.abc import Callable
 from contextlib import nullcontext
 from typing import Final
 
-from quadriga.plant.end import TOLD_TO_STOP, End
 from quadriga.plant.lockstep import run_lockstep
 from quadriga.plant.pace import TeamPace
-from quadriga.plant.protocol import Plant
+from quadriga.plant.protocol import TOLD_TO_STOP, End, Plant
 from quadriga.plant.realtime import run_realtime
+from quadriga.plant.requests import subscribe_estops, subscribe_requests
 from quadriga.plant.server import PlantServer
 from quadriga.plant.team_time import team_time
-from quadriga.plant.words import listen_to_estops, listen_to_words
 from quadriga.shared import codes
 from quadriga.shared.bus.discovery import await_agents, join, start_together
 from quadriga.shared.bus.liveness import Loss, loss_error
@@ -23,12 +22,13 @@ from quadriga.shared.config.sections import BRIDGED, Config
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.members import plant_name
 from quadriga.shared.robots.conventions import robot_names
-from quadriga.shared.runtime.clock import sleep
+from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.runtime.collector import end_collection
 from quadriga.shared.runtime.scheduling import leave_priority, take_priority
 from quadriga.shared.runtime.signals import interruptible, stop_on_signals
 from quadriga.shared.topics import COMMAND
 
+_ALL_STOP: Final = 0.3  # s, in which a team is stopped whose processes get the signal one by one
 _PAUSE: Final = 0.002  # s, between two looks of a simulated robot's plant that waits
 
 # What was expected, and what the cause may be, by the code of an end.
@@ -40,6 +40,10 @@ _BAD_ENDS: Final = {
     codes.CLOCK_SET: (
         "a system clock that nobody sets during a walk",
         "let PTP or chrony set it before; or the computer was suspended",
+    ),
+    codes.COMMAND_LOST: (
+        "commands of all robots until the end",
+        "the agent failed, was stopped, or its computer is too slow: see what it says itself",
     ),
     codes.PLANT_GONE: (
         "the plants of all robots until the end",
@@ -67,8 +71,8 @@ def run(
     Raises:
         ConfigError: the plant cannot be built from the configuration.
         BusError: the bus cannot be opened, or the team is not complete in time.
-        ProcessError: another plant, or the link to the router, vanished while the team walked, or
-            somebody set the system clock.
+        ProcessError: another plant, an agent, or the link to the router vanished while the team
+            walked, or somebody set the system clock.
         KeyboardInterrupt: it is stopped before its plant is built.
     """
     stopped = stopped or stop_on_signals()
@@ -79,12 +83,12 @@ def run(
     with Bus.open(config.bus, team, name, stopped) as bus:
         for key in sorted({*time.keys, *(COMMAND.key(team, own) for own in plant.names)}):
             bus.subscribe(key)
-        words = listen_to_words(bus)
+        requests = subscribe_requests(bus)
         if plant.is_robot:
-            plant.listen(listen_to_estops(bus))
+            plant.listen(subscribe_estops(bus))
         with interruptible(stopped):
             server = PlantServer(config, plant, bus, time, name)
-        server.words = words
+        server.requests = requests
         me, realtime = ProcessInfo(bus, config), config.world.mode == "realtime"
         if not join(bus, config, stopped, me):
             return
@@ -110,8 +114,21 @@ def _walk(server: PlantServer, pace: TeamPace | None, stopped: Callable[[], bool
     if not _start(server, pace, stopped):
         return TOLD_TO_STOP
     if server.config.world.mode == "realtime":
-        return run_realtime(server, stopped, pace)
-    return run_lockstep(server, stopped)
+        end = run_realtime(server, stopped, pace)
+    else:
+        end = run_lockstep(server, stopped)
+    if end.code == codes.COMMAND_LOST and _is_stopped_soon(stopped):
+        server.time.end = None
+        return TOLD_TO_STOP
+    return end
+
+
+def _is_stopped_soon(stopped: Callable[[], bool]) -> bool:
+    """Whether this process is stopped too, as the agent was whose commands are missing."""
+    deadline = monotonic() + _ALL_STOP
+    while not stopped() and monotonic() < deadline:
+        _pause()
+    return stopped()
 
 
 def _start(server: PlantServer, pace: TeamPace | None, stopped: Callable[[], bool]) -> bool:

@@ -3,10 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from typing import Protocol
+from typing import Final, NamedTuple, Protocol
 
+from quadriga.shared import codes
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.messages import Command, Event, State, Status, Truth
+
+
+class End(NamedTuple):
+    """Why a walk is over: a code of `quadriga.shared.codes.EVENTS`, and prose."""
+
+    code: str
+    detail: str
+
+
+TOLD_TO_STOP: Final = End(codes.SIGNAL, "signal")
 
 
 class Plant(Protocol):
@@ -74,13 +85,8 @@ class Plant(Protocol):
         cause = "no sensor or motor of a real robot is made faulty on purpose"
         raise ConfigError("fault", repr(fault), "a simulated world", cause)
 
-    def expect_down(self, lowered: Collection[str], stopped: Collection[str] = ()) -> None:
-        """Hear which robots go to the ground without a fall, until they are up again.
-
-        Args:
-            lowered: led there, since their commands are lost; they may not tip over.
-            stopped: damped by an emergency stop, from whatever they were doing.
-        """
+    def expect_down(self, stopped: Collection[str]) -> None:
+        """Hear which robots an emergency stop damps now: until they are up again none falls."""
         return
 
     def truth(self) -> Truth | None:

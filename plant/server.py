@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Final
 
-from quadriga.plant.commands import CommandBox
-from quadriga.plant.end import End
-from quadriga.plant.late import damp_joints
-from quadriga.plant.lost import LostCommands
-from quadriga.plant.protocol import Plant
+from quadriga.plant.commands import CommandBox, damp_joints
+from quadriga.plant.protocol import End, Plant
+from quadriga.plant.requests import NO_REQUESTS, Requests
 from quadriga.plant.team_time import TeamTime
-from quadriga.plant.words import NO_WORDS, Words
 from quadriga.shared import codes
-from quadriga.shared.bus.liveness import LossTimer, find_lost_link
-from quadriga.shared.bus.membership import members
-from quadriga.shared.bus.session import HERE, Bus
+from quadriga.shared.bus.liveness import find_lost_link
+from quadriga.shared.bus.session import Bus
 from quadriga.shared.codec import encode, truncate_text
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
@@ -24,10 +20,8 @@ from quadriga.shared.errors import ConfigError
 from quadriga.shared.members import SIM
 from quadriga.shared.messages import Clock, Command, Event, Reset, SafeStop, Status, format_event
 from quadriga.shared.robots.conventions import robot_names
-from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.topics import CLOCK, EVENT, POSTURE, STATE, STATUS, TRUTH
 
-_TOLD_AFTER: Final = 5.0  # s; a process looks for a router that is gone at least every 4 s
 FALL_LINGER_MS: Final = 1000  # world time that is still shown after the first simulated fall
 # World time in which a team that has been asked to stop slows down, comes to stand and settles.
 STOP_LINGER_MS: Final = 2000
@@ -45,12 +39,9 @@ class PlantServer:
         name: of this process.
 
     Attributes:
-        words: gives what people have said since it was called last. A robot sees to an emergency
-            stop itself.
+        requests: gives what people have asked for since it was called last. A bridge sees to an
+            emergency stop itself.
         commands: the newest command of every robot of the plant.
-        silent: robots that are not waited for.
-        operator_gone: whether the operator has left, in real time.
-        late_ms: by robot, for how long its motors have not followed its commands, in real time.
     """
 
     def __init__(
@@ -60,24 +51,14 @@ class PlantServer:
         self.config, self.plant, self.bus = config, plant, bus
         self.time = time or TeamTime()
         self.commands = CommandBox(team, plant.names, config.robot)
-        self.silent: set[str] = set()
-        self.operator_gone = False
-        self.late_ms: dict[str, int] = {}
-        self._lost, self._lowered = LostCommands(config), frozenset[str]()
-        self.words: Callable[[], Words] = lambda: NO_WORDS
+        self.requests: Callable[[], Requests] = lambda: NO_REQUESTS
         self._estopped = -1  # tick of the last answer to the emergency stop in force; −1: none is
         self._stop = ""  # why somebody has asked the team to stop, and the walk to end
-        # What is said may come twice; a release may end no stop that was pressed meanwhile.
-        self._heard: SafeStop | None = None
-        self._released: Reset | None = None
-        self._outage: tuple[float, float] | None = None  # when the link was back, and after what
-        self._link = LossTimer(lambda: find_lost_link(bus, config), config, grace=0.0)
+        # A request may come twice; a release may end no stop that was pressed meanwhile.
+        self._last_stop: SafeStop | None = None
+        self._last_reset: Reset | None = None
         self._put_state = {
             name: bus.publisher(STATE.key(team, name), droppable=realtime) for name in plant.names
-        }
-        # A robot that no longer reads must not hold up the others once its buffers are full.
-        self._put_silent = {
-            name: bus.publisher(STATE.key(team, name), droppable=True) for name in plant.names
         }
         self._put_posture = {
             name: bus.publisher(POSTURE.key(team, name), droppable=True) for name in plant.names
@@ -105,11 +86,8 @@ class PlantServer:
         # States come first: agents wait for them, and in real time they have a millisecond.
         seen: list[tuple[str, bytes]] = []
         for name, state in plant.states().items():
-            # Other plants wait for every state in lock-step: theirs may not be lost.
-            droppable = name in self.silent and self.time.alone
-            put = self._put_silent if droppable else self._put_state
             payload = encode(state)
-            put[name](payload)
+            self._put_state[name](payload)
             seen.append((name, payload))
         if self.time.drives and plant.tick % self._periods[CLOCK.name] == 0:
             self._put_clock(encode(Clock(plant.tick, plant.tick * 1_000_000)))
@@ -143,36 +121,32 @@ class PlantServer:
         for packet in self.bus.drain():
             self.take(*packet, oldest)
 
-    def look_at_link(self) -> None:
-        """Set the end of this plant's walk if its link to the router is gone for good.
-
-        Nobody hears it then. That a link is back is announced once the others have one, too.
-        """
-        before, loss, now = self._link.since, self._link.poll(), monotonic()
+    def check_link(self) -> None:
+        """End this plant's walk if its link to the router is gone: nobody hears it any more."""
+        loss = find_lost_link(self.bus, self.config)
         if loss is not None and self.time.end is None:
             self.time.end = End(*loss)
-        if before is not None and self._link.since is None:
-            self._outage = now, now - before
-        if self._outage is not None and self._others_are_back(now - self._outage[0]):
-            seconds, self._outage = self._outage[1], None
-            self.announce(codes.LINK_BACK, "", f"no link to the router for {seconds:.1f} s")
 
-    def _others_are_back(self, waited: float) -> bool:
-        """Whether the others have a link again, `waited` seconds after this one, or never will."""
-        if waited > self.config.bus.reconnect_timeout:
-            return True
-        here = {self.bus.name, *self.bus.members_at(HERE)}
-        return waited > _TOLD_AFTER and here.issuperset(members(self.config))
+    def end_without(self, robots: Collection[str], why: str) -> None:
+        """End the walk because commands of some robots do not come any more, if there are any."""
+        if not robots:
+            return
+        for refused in filter(None, map(self.commands.why_refused, sorted(robots))):
+            why += f", its last command was refused ({refused})"
+        detail = f"{', '.join(sorted(robots))} {why}{self.bus.standstill.note}"
+        self.end(End(codes.COMMAND_LOST, detail))
+
+    def end(self, end: End) -> None:
+        """End the walk; of other plants the one that drives time hears it, and announces it."""
+        if self.time.end is not None:
+            return
+        self.time.end = end
+        if not self.time.drives:
+            self.announce(end.code, self.plant.names[0], end.detail)
 
     def announce(self, code: str, robot: str, detail: str) -> None:
         """Publish an event of the present tick; a detail longer than a message's text is cut."""
         self._send(Event.of(self.plant.tick, code, robot, truncate_text(detail)))
-
-    def explain_silence(self, robot: str, why: str) -> str:
-        """Why a robot is given up, and what was wrong with its latest command if something was."""
-        if refused := self.commands.why_refused(robot):
-            why += f", its last command was refused ({refused})"
-        return why + self.bus.standstill.note
 
     def publish_status(self, status: Status) -> None:
         """Publish the plant's report on itself."""
@@ -181,12 +155,14 @@ class PlantServer:
     def step(self, commands: Mapping[str, Command]) -> End | None:
         """Advance the plant by one tick; why the walk ends, if it does."""
         self._report_invalid()
-        words = self.words()
-        if words is not NO_WORDS:
-            self._hear(words)
-            for fault in words.faults:
+        requests = self.requests()
+        if requests is not NO_REQUESTS:
+            self._obey(requests)
+            for fault in requests.faults:
                 self._inject(fault)
-        for event in self.plant.step(self._final_commands(commands)):
+        if self._estopped >= 0:
+            commands = {name: damp_joints(self.plant.tick) for name in self.plant.names}
+        for event in self.plant.step(commands):
             if event.robot or self.time.drives:  # what concerns all is announced once
                 self._send(event)
             self._note_fall(event)
@@ -204,13 +180,13 @@ class PlantServer:
             return End(codes.STOPPED, self._stop)
         return End(codes.TIME_OVER, "end of world.duration")
 
-    def _hear(self, words: Words) -> None:
-        """Obey what people have said; an emergency stop outranks its release."""
+    def _obey(self, requests: Requests) -> None:
+        """Do what people have asked for; an emergency stop outranks its release."""
         plant, tick = self.plant, self.plant.tick
         robot = "" if self.time.alone else plant.names[0]
-        stop = words.stop
-        if stop is not None and stop != self._heard and self.time.drives:
-            self._heard = stop
+        stop = requests.stop
+        if stop is not None and stop != self._last_stop and self.time.drives:
+            self._last_stop = stop
             end = "; the walk ends" if stop.ends else ""
             self.announce(codes.STOP_ASKED, "", f"{stop.reason}{end}")
             if stop.ends and not self._stop:
@@ -218,30 +194,17 @@ class PlantServer:
                 self._last_tick = min(self._last_tick, tick + STOP_LINGER_MS)
         if plant.is_robot:
             return
-        reset = words.reset
-        if reset is not None and reset != self._released:
-            self._released = reset
-            if 0 <= self._estopped <= reset.tick and not words.estop:
+        reset = requests.reset
+        if reset is not None and reset != self._last_reset:
+            self._last_reset = reset
+            if 0 <= self._estopped <= reset.tick and not requests.estop:
                 self._estopped = -1
-                self.announce(codes.RESET, robot, f"by {reset.by}: robots may get up")
-                plant.expect_down(self._lowered)
-        if words.estop and (self._estopped < 0 or tick >= self._estopped + _ANSWER_MS):
+                self.announce(codes.RESET, robot, f"by {reset.by}: robots may stand up")
+                plant.expect_down(())
+        if requests.estop and (self._estopped < 0 or tick >= self._estopped + _ANSWER_MS):
             self._estopped = tick
-            self.announce(codes.ESTOPPED, robot, f"{words.estop}: every joint is damped")
-            plant.expect_down(self._lowered, stopped=plant.names)
-
-    def _final_commands(self, commands: Mapping[str, Command]) -> Mapping[str, Command]:
-        """What the motors get: the commands, unless the team is stopped or some are lost."""
-        plant = self.plant
-        if self._estopped >= 0:
-            return {name: damp_joints(plant.tick) for name in plant.names}
-        filled = self._lost.fill(plant.tick, plant.names, commands, plant.states)
-        if self._lost.lowered != self._lowered:
-            for name in sorted(self._lost.lowered - self._lowered):
-                self.announce(codes.LOWERED, name, "no command: its joints are led down")
-            self._lowered = self._lost.lowered
-            plant.expect_down(self._lowered)
-        return filled
+            self.announce(codes.ESTOPPED, robot, f"{requests.estop}: every joint is damped")
+            plant.expect_down(plant.names)
 
     def _inject(self, fault: str) -> None:
         """Make a sensor or motor of one of the plant's robots faulty, or say why not."""

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from typing import Final
 
-from quadriga.plant.end import End
+from quadriga.plant.protocol import End
 from quadriga.shared import codes
 from quadriga.shared.codec import decode, envelope
 from quadriga.shared.config.sections import Config
@@ -72,7 +72,6 @@ class LeadTime(TeamTime):
         self._others = {name: (STATE.key(team, name), COMMAND.key(team, name)) for name in names}
         self._newest = {key: -1 for keys in self._others.values() for key in keys}
         self.keys = frozenset({*self._newest, self._event})
-        self._silent: set[str] = set()
         self._most_ahead = _JUMP_MS if config.world.mode == "realtime" else 0
 
     def take(self, key: str, payload: bytes, tick: int) -> None:
@@ -87,22 +86,18 @@ class LeadTime(TeamTime):
             event = decode(payload, Event)
         except MessageError:
             return
-        if event.code == codes.CLOCK_SET:
-            self.end = self.end or End(event.code, event.detail)
         if event.robot not in self._others:
             return
-        if event.code in codes.DOWN:
+        if event.code in (codes.CLOCK_SET, codes.COMMAND_LOST):
+            self.end = self.end or End(event.code, event.detail)
+        elif event.code in codes.DOWN:
             self.falls.append(event)
-        elif event.code in (codes.SILENT, codes.GONE):
-            self._silent.add(event.robot)
-        elif event.code == codes.BACK:
-            self._silent.discard(event.robot)
 
     def awaited(self, tick: int) -> frozenset[str]:
         unanswered = (
             plant_name(name)
             for name, (_, command) in self._others.items()
-            if self._newest[command] < tick and name not in self._silent
+            if self._newest[command] < tick
         )
         return self.behind(tick).union(unanswered)
 

@@ -30,16 +30,12 @@ FAULT_BEGINS: Final = "fault-begins"
 FAULT_ENDS: Final = "fault-ends"
 FAULT_ASKED: Final = "fault-asked"
 FAULT_REFUSED: Final = "fault-refused"
-SILENT: Final = "silent"
-GONE: Final = "gone"
-BACK: Final = "back"
-OPERATOR_GONE: Final = "operator-gone"
-OPERATOR_BACK: Final = "operator-back"
 MALFORMED: Final = "malformed"
 TIME_OVER: Final = "time-over"
 FALLEN: Final = "fallen"
 SIGNAL: Final = "signal"
 STOPPED: Final = "stopped"
+COMMAND_LOST: Final = "command-lost"
 PLANT_GONE: Final = "plant-gone"
 PLANT_FAILED: Final = "plant-failed"
 LINK_LOST: Final = "link-lost"
@@ -48,13 +44,11 @@ ESTOPPED: Final = "estop"
 LIES: Final = "lies"
 STOP_ASKED: Final = "stop-asked"
 RESET: Final = "reset"
-LOWERED: Final = "lowered"
 INPUT_LOST: Final = "input-lost"
 HALTS: Final = "halts"
 RESUMED: Final = "resumed"
-RISES: Final = "rises"
+STANDS_UP: Final = "stands-up"
 STANDS_AGAIN: Final = "stands-again"
-LINK_BACK: Final = "link-back"
 BRIDGE_MODE: Final = "bridge-mode"
 ROBOT_STOPPED: Final = "robot-stopped"
 CLOCK_OFF: Final = "clock-off"
@@ -73,25 +67,18 @@ EVENTS: Final[Mapping[str, EventCode]] = MappingProxyType(
         FAULT_ENDS: EventCode("fault", "a fault that was made on purpose is over"),
         FAULT_ASKED: EventCode("fault", "somebody has asked for a fault: as in world.faults"),
         FAULT_REFUSED: EventCode("fault", "somebody has asked for one that there cannot be"),
-        SILENT: EventCode("fault", "a robot did not answer in time: the world waits no longer"),
-        GONE: EventCode("fault", "a robot left the bus: the world waits no longer"),
-        BACK: EventCode("fault", "a robot answers again: the world waits for it"),
-        OPERATOR_GONE: EventCode("fault", "the operator left the bus: no reference counts"),
-        OPERATOR_BACK: EventCode("fault", "the operator is there again"),
         MALFORMED: EventCode("fault", "commands that are none, or that nobody can mean"),
         ESTOPPED: EventCode("fault", "the emergency stop: simulated joints are damped from now on"),
         LIES: EventCode("fault", "a robot that is stopped has sunk to the ground: no fall"),
         STOP_ASKED: EventCode("fault", "somebody has asked the team to slow down and stand"),
         RESET: EventCode("fault", "the operator has released the emergency stop"),
-        LOWERED: EventCode("fault", "a simulated robot without commands is led down: no fall"),
         INPUT_LOST: EventCode("fault", "an agent slows down and stands: it lacks an input"),
         HALTS: EventCode("fault", "an agent slows down and stands, as somebody has asked"),
         RESUMED: EventCode(
             "fault", "an agent walks again: its inputs have been whole for `team.resume_after`"
         ),
-        RISES: EventCode("fault", "an agent gets its robot up, which was led down or stopped"),
-        STANDS_AGAIN: EventCode("fault", "an agent's robot stands that had been down"),
-        LINK_BACK: EventCode("fault", "the link to the router was gone for a while"),
+        STANDS_UP: EventCode("fault", "an agent's robot, which was damped, stands up"),
+        STANDS_AGAIN: EventCode("fault", "an agent's robot stands that had been damped"),
         BRIDGE_MODE: EventCode(
             "bridge", "a bridge's robot begins to stand up, walk or lie down, or is hot"
         ),
@@ -101,6 +88,9 @@ EVENTS: Final[Mapping[str, EventCode]] = MappingProxyType(
         FALLEN: EventCode("stop", "the walk is over: a robot fell"),
         SIGNAL: EventCode("stop", "the walk is over: the world was told to stop"),
         STOPPED: EventCode("stop", "the walk is over: somebody has asked the team to stop"),
+        COMMAND_LOST: EventCode(
+            "stop", "the walk is over: commands of a robot do not come any more"
+        ),
         PLANT_GONE: EventCode("stop", "the walk is over: one of several plants left or is silent"),
         CLOCK_SET: EventCode("stop", "the walk is over: somebody set a plant's system clock"),
         PLANT_FAILED: EventCode("stop", "the walk is over: the plant failed"),

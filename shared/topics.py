@@ -63,7 +63,7 @@ RESUME: Final = Topic(
     period_ms=0,
     repeats=True,
 )
-WORDS: Final = (ESTOP, STOP, RESET, RESUME)  # of people, who may not know the team's time
+REQUESTS: Final = (ESTOP, STOP, RESET, RESUME)  # of people, who may not know the team's time
 LIVE_FAULT: Final = Topic("fault", msg.LiveFault, (LAUNCHER,), (SIM,), period_ms=0, repeats=True)
 TRUTH: Final = Topic("sim/truth", msg.Truth, (SIM,), (AGENT, LAUNCHER), period_ms=CONFIGURED)
 EVENT: Final = Topic(
@@ -92,7 +92,7 @@ POSTURE: Final = Topic(
 )
 
 _OWN: Final = (
-    STATE, COMMAND, MEASUREMENT, PLAN, STATUS, INPUTS, REFERENCE, *WORDS, LIVE_FAULT, TRUTH,
+    STATE, COMMAND, MEASUREMENT, PLAN, STATUS, INPUTS, REFERENCE, *REQUESTS, LIVE_FAULT, TRUTH,
     EVENT, AGENT_EVENT, INJECTED, CLOCK, POSTURE,
 )  # fmt: skip
 TABLE: Final = (*_OWN, *plugin_topics(_OWN))

@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any, Final
 
-from quadriga.agents.announced_end import AnnouncedEnd
 from quadriga.agents.planning.interface import NOTHING, Expected
 from quadriga.agents.planning.operator_references import AHEAD_MS
 from quadriga.agents.planning.reference_slew import ReferenceSlew
@@ -17,7 +16,6 @@ from quadriga.agents.plausibility import (
     measured_limits,
 )
 from quadriga.agents.step_io import Inputs
-from quadriga.agents.teammates import concerns_agents
 from quadriga.agents.time_grid import step_ms
 from quadriga.shared.codec import decode
 from quadriga.shared.config.sections import Config
@@ -32,6 +30,7 @@ from quadriga.shared.topics import (
     MEASUREMENT,
     PLAN,
     REFERENCE,
+    REQUESTS,
     RESET,
     RESUME,
     SAMPLE_MS,
@@ -39,7 +38,6 @@ from quadriga.shared.topics import (
     STATUS,
     STOP,
     TRUTH,
-    WORDS,
     Topic,
 )
 
@@ -69,6 +67,7 @@ class Inbox:
         received: valid messages by topic and sender.
         refused: whether a valid message that is no state was refused: too many were held, or it
             is of a time too far ahead.
+        ended: whether the end of the walk has been announced.
     """
 
     def __init__(self, config: Config, robot: str, peers: Sequence[str]) -> None:
@@ -80,7 +79,7 @@ class Inbox:
             STATE.key(team, robot): (STATE, robot),
             REFERENCE.key(team): (REFERENCE, OPERATOR),
             EVENT.key(team): (EVENT, SIM),
-            **{word.key(team): (word, "") for word in WORDS},
+            **{word.key(team): (word, "") for word in REQUESTS},
         }
         if config.estimator.kind == "truth":
             self.topics[TRUTH.key(team)] = (TRUTH, SIM)
@@ -95,8 +94,7 @@ class Inbox:
             self.topics[MEASUREMENT.key(team, peer)] = (MEASUREMENT, peer)
         self.counters: Counter[str] = Counter()
         self.received: Counter[Source] = Counter()
-        self.refused = False
-        self._end = AnnouncedEnd()
+        self.refused = self.ended = False
         self._newest: dict[Source, Order] = {}
         self._held: dict[str, list[tuple[str, Any]]] = {}  # sender and message by topic
         self._count: Counter[Source] = Counter()  # of these
@@ -109,9 +107,8 @@ class Inbox:
         is_measurable(self._measurable, self._measurable)  # compiled, or loaded, now
         self._state: State | None = None
         self._sample_end: State | None = None  # older than `_state`
-        self._words: dict[Topic, Any] = {}  # the last of each
+        self._requests: dict[Topic, Any] = {}  # the last of each
         self._released: Message | None = None
-        self._events: list[Event] = []
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -129,7 +126,7 @@ class Inbox:
         if message is None or not _is_believable(message, self._robot, self._measurable):
             self.counters[f"dropped_{topic.name}"] += 1
             return
-        if topic not in (STATE, EVENT, *WORDS) and self._is_ahead(message):
+        if topic not in (STATE, EVENT, *REQUESTS) and self._is_ahead(message):
             self.counters[f"ahead_{topic.name}"] += 1
             self.refused = True
             return
@@ -147,17 +144,14 @@ class Inbox:
     def _keep(self, topic: Topic, sender: str, message: Message) -> None:
         if isinstance(message, State):
             self._keep_newest(message)
-        elif topic in WORDS:
+        elif topic in REQUESTS:
             # What is said may come twice; a release may end no stop that was pressed meanwhile.
             if topic is not RESET or message != self._released:
-                self._words[topic] = message
+                self._requests[topic] = message
             if topic is RESET:
                 self._released = message
         elif isinstance(message, Event):
-            if message.kind == "stop":
-                self._end.announce(message.tick, self._newest_state)
-            if concerns_agents(message) and len(self._events) < _HELD:
-                self._events.append(message)
+            self.ended = self.ended or message.kind == "stop"
         else:
             source = (topic.name, sender)
             if self._count[source] >= self._most:
@@ -179,12 +173,6 @@ class Inbox:
         if passed is not None:
             self.counters["states_passed_over"] += 1
         self._state = state
-        self._end.pass_tick(state.tick)
-
-    @property
-    def ended(self) -> bool:
-        """Whether the end of the walk has been announced, and time has not gone on since."""
-        return self._end.awaited
 
     @property
     def has_state(self) -> bool:
@@ -224,27 +212,25 @@ class Inbox:
 
     def pop_inputs(self, state: State, expected: Expected) -> Inputs:
         """All that is due at the step of `state`, sorted by robot, then tick; it is removed."""
-        if self._lockstep and expected is NOTHING and not (self._words or self._events):
+        if self._lockstep and expected is NOTHING and not self._requests:
             return Inputs(state)
         plans = self._pop_due(PLAN, expected.plan)
         measurements = self._pop_due(MEASUREMENT, _tick(expected.measurement_tick))
         references = self._pop_due(REFERENCE, _tick(expected.reference_tick))
         truths = self._pop_due(TRUTH, _tick(state.tick if expected.truth else None))
         statuses = self._pop_due(STATUS, None)
-        words, self._words = self._words, {}
-        events, self._events = self._events, []
+        requests, self._requests = self._requests, {}
         return Inputs(
             state,
             tuple(measurements),
             tuple(plans),
             tuple(self._slew.limit(reference) for _, reference in references),
-            words.get(ESTOP),
+            requests.get(ESTOP),
             truths[-1][1] if truths else None,
-            stop=words.get(STOP),
-            reset=words.get(RESET),
-            resume=words.get(RESUME),
+            stop=requests.get(STOP),
+            reset=requests.get(RESET),
+            resume=requests.get(RESUME),
             statuses=tuple(statuses),
-            events=tuple(events),
         )
 
     def _pop_due(self, topic: Topic, limit: Order | None) -> list[tuple[str, Any]]:

@@ -12,18 +12,17 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.members import OPERATOR, SIM
 from quadriga.shared.messages import Consumed, Message
 from quadriga.shared.topics import (
-    EVENT,
     MEASUREMENT,
     PLAN,
     REFERENCE,
     REFERENCE_EPOCH_MS,
+    REQUESTS,
     STATUS,
     TRUTH,
-    WORDS,
 )
 
 ANYONE: Final = "anyone"  # who stopped the team, released a stop or had it go on
-_UNRULED: Final = frozenset((EVENT.name, *(word.name for word in WORDS)))
+_UNRULED: Final = frozenset(topic.name for topic in REQUESTS)
 _FIRST: Final = (-1, 0)
 
 
@@ -89,8 +88,8 @@ class Intake:
 def has_rule(source: Source, order: Order) -> bool:
     """Whether the rules of lock-step speak of such a message.
 
-    They know nothing of what people say, of what the plant says of robots, nor of a second
-    operator's references between those of the first.
+    They know nothing of what people ask for, nor of a second operator's references between those
+    of the first.
     """
     if source[0] == REFERENCE.name:
         return order[0] % REFERENCE_EPOCH_MS == 0
@@ -104,11 +103,10 @@ def list_messages(inputs: Inputs) -> list[tuple[Source, Order]]:
         *((MEASUREMENT.name, name, sample) for name, sample in inputs.measurements),
         *((REFERENCE.name, OPERATOR, reference) for reference in inputs.references),
         *((STATUS.name, name, status) for name, status in inputs.statuses),
-        *((EVENT.name, SIM, event) for event in inputs.events),
     ]
-    for topic, word in zip(WORDS, inputs.words, strict=True):
-        if word is not None:
-            messages.append((topic.name, ANYONE, word))
+    for topic, request in zip(REQUESTS, inputs.requests, strict=True):
+        if request is not None:
+            messages.append((topic.name, ANYONE, request))
     if inputs.truth is not None:
         messages.append((TRUTH.name, SIM, inputs.truth))
     return [((name, sender), order_of(message)) for name, sender, message in messages]

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadriga.agents.gait import nominal_forces, nominal_table
-from quadriga.agents.modes import PEER_LOST
 from quadriga.agents.planner.compiled_step import CompiledStep, OwnWindow, past_deviations
 from quadriga.agents.planner.cooperation import (
     build_team_problem,
@@ -35,6 +34,7 @@ from quadriga.agents.predictor.predictor import Predictor, check_sizes
 from quadriga.agents.time_grid import horizon_stance, phase_of, place_in, walking_steps
 from quadriga.shared.codes import with_detail
 from quadriga.shared.config.sections import Config
+from quadriga.shared.modes import PEER_LOST
 from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.record import record
 

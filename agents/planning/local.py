@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import field, replace
 from typing import Final
 
-from quadriga.agents.modes import PEER_LOST, WALK, WINDOW_LOST, Mode
 from quadriga.agents.planner.cooperation import brings_forward, is_cooperative, relevant_peers
 from quadriga.agents.planner.neighbours import Neighbours
 from quadriga.agents.planner.peer_memory import PeerMemory
@@ -29,6 +28,7 @@ from quadriga.agents.time_grid import exchange_ms, first_step, owed_from, patien
 from quadriga.shared.codes import with_detail
 from quadriga.shared.config.sections import Config
 from quadriga.shared.messages import Measurement, Reference
+from quadriga.shared.modes import PEER_LOST, WALK, WINDOW_LOST, Mode
 from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.runtime.record import record
 from quadriga.shared.topics import SAMPLE_MS

@@ -12,7 +12,6 @@ import numpy as np
 # what an agent's behaviour depends on finds these.
 import quadriga.agents.planning.local
 import quadriga.agents.planning.remote  # noqa: F401
-from quadriga.agents.modes import WALK
 from quadriga.agents.planner.qp_solver import SolvedQp
 from quadriga.agents.planner.team_planner import Collected
 from quadriga.agents.planning.active_plan import ActivePlan, PlanCheck, add_plan
@@ -27,6 +26,7 @@ from quadriga.agents.planning.operator_references import reference_at
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config
 from quadriga.shared.messages import Plan
+from quadriga.shared.modes import WALK
 from quadriga.shared.planner_kinds import find_kind, load_builder
 from quadriga.shared.runtime.record import record
 

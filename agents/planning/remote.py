@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from quadriga.agents.modes import PLANNER_LOST, WALK
 from quadriga.agents.planning.active_plan import FARTHEST, ActivePlan, PlanCheck
 from quadriga.agents.planning.fade import FADED, fade_factor
 from quadriga.agents.planning.interface import (
@@ -22,6 +21,7 @@ from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.time_grid import first_step, owed_from, patience, step_ms
 from quadriga.shared.config.sections import Config
 from quadriga.shared.messages import Measurement, Plan
+from quadriga.shared.modes import PLANNER_LOST, WALK
 from quadriga.shared.runtime.record import record
 from quadriga.shared.topics import SAMPLE_MS
 

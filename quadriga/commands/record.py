@@ -97,8 +97,7 @@ def run(arguments: argparse.Namespace, config: Config, given: Given) -> int:
         files = process.run(
             config, path, predictor_sha256=sha256, stopped=stopped, selection=selection, say=say
         )
-        # A recorder that was started again has but a part: `run.mcap` is another's.
-        if stopped() or not arguments.report or files.paths[0] != path:
+        if stopped() or not arguments.report:
             print(printable(_format_files(files)), flush=True)
             if files.error is not None:
                 raise files.error

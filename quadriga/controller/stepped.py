@@ -11,8 +11,17 @@ from typing import Any, Final
 
 import numpy as np
 
-from quadriga.agents.healing import Healing, ramp
-from quadriga.agents.modes import (
+from quadriga.agents.modes import Resume, ramp
+from quadriga.agents.planning.interface import NOTHING, Expected
+from quadriga.agents.planning.operator_references import reference_at, remember_references
+from quadriga.agents.step_io import Inputs, Outputs
+from quadriga.controller.motor_command import CAUSE
+from quadriga.plant.commands import damp_joints
+from quadriga.shared.codes import with_detail
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import ProcessError
+from quadriga.shared.messages import Command, Reference, State
+from quadriga.shared.modes import (
     ESTOP,
     REFERENCE_LOST,
     RESET,
@@ -22,19 +31,9 @@ from quadriga.agents.modes import (
     WALK,
     Mode,
     Stop,
+    next_mode,
     resolve_stops,
-    rests,
-    step_mode,
 )
-from quadriga.agents.planning.interface import NOTHING, Expected
-from quadriga.agents.planning.operator_references import reference_at, remember_references
-from quadriga.agents.step_io import Inputs, Outputs
-from quadriga.controller.motor_command import CAUSE
-from quadriga.plant.late import damp_joints
-from quadriga.shared.codes import with_detail
-from quadriga.shared.config.sections import Config
-from quadriga.shared.errors import ProcessError
-from quadriga.shared.messages import Command, Reference, State
 from quadriga.shared.runtime.record import record
 from quadriga.shared.topics import REFERENCE, REFERENCE_EPOCH_MS
 
@@ -51,7 +50,7 @@ class ControllerMemory:
     tick: int
     mode: Mode
     references: tuple[Reference, ...] = ()
-    healing: Healing = field(default_factory=Healing)
+    resume: Resume = field(default_factory=Resume)
 
 
 class SteppedController:
@@ -86,27 +85,27 @@ class SteppedController:
         references = remember_references(state.references, inputs.references, tick)
         _, age = reference_at(references, tick, self._height)
         mode = self._course(state.mode, inputs, led=age <= REFERENCE.max_age_ms)
-        goes_on = rests(state.mode) and mode.name == WALK
-        healing = Healing(resumed=tick) if goes_on else state.healing
+        resumes = state.mode.may_resume and mode.name == WALK
+        resume = Resume(resumed=tick) if resumes else state.resume
         if mode.passive:
             command = damp_joints(tick)
         else:
-            followed, _ = reference_at(ramp(references, healing, tick), tick, self._height)
+            followed, _ = reference_at(ramp(references, resume, tick), tick, self._height)
             answer = self._step(inputs.state, _slowed(followed, mode, tick))
             command = self._check(answer, tick)
         ages = {REFERENCE.name: float(age)}
         outputs = Outputs(command, None, None, mode.name, mode.reason, _NO_COUNTS, ages, None)
-        return ControllerMemory(tick, mode, references, healing), outputs
+        return ControllerMemory(tick, mode, references, resume), outputs
 
     def _course(self, mode: Mode, inputs: Inputs, *, led: bool) -> Mode:
         """The mode at this tick: what people have said, and whether an operator is there."""
         tick, stops = inputs.state.tick, list[Stop]()
         if mode.passive and inputs.reset is not None and inputs.estop is None:
             mode = Mode(STAND, tick, RESET)
-        elif rests(mode) and mode.name == STAND and inputs.resume is not None:
+        elif mode.may_resume and mode.name == STAND and inputs.resume is not None:
             mode = Mode(WALK, tick)
         else:
-            mode = step_mode(mode, tick, self._stand_ms, half_cycle_ends=True)
+            mode = next_mode(mode, tick, self._stand_ms, stance_ends=True)
         if inputs.estop is not None:
             stops.append(Stop(ESTOP, with_detail(ESTOP, inputs.estop.reason)))
         if inputs.stop is not None:

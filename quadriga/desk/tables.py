@@ -22,7 +22,7 @@ _FIGURES: Final = (
     ("pitch_rms", "pitch mrad", 1e3, 2),
 )
 WALKED_ON, LAY_DOWN, DAMPED, DRIVEN = "walked on", "lay down", "damped", "still driven"
-_STOPPED: Final = "stopped"
+_STOPPED: Final = "estop"
 ENOUGH: Final = 0.99  # share of real time that simulated robots must keep to be like real ones
 
 

@@ -45,7 +45,7 @@ _STEADY_S: Final = 4.0  # from the begin of a walk to its steady part
 _EARLIEST_S, _LATEST_S = 2.0, 4.0  # from the begin of a walk until something goes wrong
 _START_S: Final = 120.0  # for the team to start and stand up
 _AFTER_S: Final = 12.0  # for robots to come to rest once a walk must be over
-_WALKS: Final = "walking"
+_WALKS: Final = "walk"
 WITHOUT: Final = "without-bridges"  # in place of a fault: the same walk of the simulated world
 
 

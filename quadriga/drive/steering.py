@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final, NamedTuple
 
-from quadriga.agents.modes import STAND, STOPPED, STOPPING, WALK
 from quadriga.drive.charge import InCharge, why_stand
 from quadriga.drive.wish import Wish
 from quadriga.shared.codes import with_detail
 from quadriga.shared.messages import Status
+from quadriga.shared.modes import STAND, STOPPED, STOPPING, WALK
 from quadriga.shared.runtime.record import record
 
 DRIVER: Final = "driver: "  # begins the reason of a stop that driving on ends

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Final
 
-from quadriga.agents.modes import ESTOP
 from quadriga.shared import codes
 from quadriga.shared.messages import Event, Status
+from quadriga.shared.modes import ESTOP
 
 PLANT: Final = "plant"
 _AT_REST: Final = frozenset((codes.ESTOPPED, codes.ROBOT_STOPPED))  # what plants announce

@@ -125,8 +125,8 @@ def describe_row(row: dict[str, Any]) -> str:
         return f"no result: {row['error'].splitlines()[0]}"
     parts = [f"at {row['robot']}, {1e-3 * row['tick']:.2f} s"]
     parts.append(f"fell: {', '.join(row['falls']) or 'none'}")
-    if row["lowered"]:
-        parts.append(f"led down: {', '.join(row['lowered'])}")
+    if row["lost"]:
+        parts.append(f"without commands: {', '.join(row['lost'])}")
     for name, title in _TIMES:
         if row[name]:
             parts.append(f"{title} {row[name]} ms")

@@ -12,7 +12,7 @@ from quadriga.faults.given import find_given_fault
 from quadriga.faults.link_faults import LINK_FAULTS, LINK_WORDS, LINKS
 from quadriga.faults.load_faults import LOAD_FAULTS
 from quadriga.faults.process_faults import PROCESS_FAULTS
-from quadriga.faults.restart_faults import RESTART_FAULTS
+from quadriga.faults.world_faults import WORLD_FAULTS
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError, did_you_mean
 from quadriga.tables import Table
@@ -20,7 +20,7 @@ from quadriga.tables import Table
 ALL: Final = "all"
 FAULTS: Final = (
     *PROCESS_FAULTS,
-    *RESTART_FAULTS,
+    *WORLD_FAULTS,
     *LOAD_FAULTS,
     *CLOCK_FAULTS,
     *COMPONENT_FAULTS,

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
 from quadriga.recordings.gaps import missing_ticks
@@ -16,7 +17,7 @@ from quadriga.shared.recording.reader import Recording
 from quadriga.shared.topics import STATE
 
 _WALKS: Final = "walk"
-_STANDS: Final = ("stand", "damping", "estop")  # a robot that walks no more
+_STANDS: Final = ("stand", "passive", "estop")  # a robot that walks no more
 _ANNOUNCED: Final = (codes.FAULT_BEGINS, codes.FAULT_ENDS)
 _SILENT_MS: Final = 300  # without a status, of which one is due every 100 ms
 _CLOCK_MS: Final = 500  # by which the walk may be further than the clock that was read last
@@ -47,14 +48,14 @@ def describe_outcome(
     """The row of a trial.
 
     `detect_ms` is the time from the fault until an agent no longer walks, or the world announces
-    that a robot is silent or gone, or any process misses the world; None if nobody ever noticed.
+    the end of the walk, or any process misses the world; None if nobody ever noticed.
     `stand_ms` is the time until all others stand, or are damped; None if they walked on.
     `recover_ms` is the time until all robots walk again for good: 0 if none stopped, None if one
-    has not walked again, or if the recording lacks the end of the walk. `lowered` are robots that
-    the world has led down since no commands came; their agents' last words in `status` may be of
-    before. `lost_messages` counts what the recording lacks of the other robots, in real time also
-    commands that were never sent, and the states and commands of all robots that it lacks before
-    the fault because it ends too early.
+    has not walked again, or if the recording lacks the end of the walk. `lost` are robots without
+    whose commands the walk ended; their agents' last statuses may be of before. `lost_messages`
+    counts what the recording lacks of the other robots, in real time also commands that were never
+    sent, and the states and commands of all robots that it lacks before the fault because it ends
+    too early.
 
     Args:
         config: of the walk.
@@ -80,7 +81,7 @@ def describe_outcome(
         "robots": config.team.robots,
         "falls": fallen,
         "falls_of_others": sum(name in fallen for name in others),
-        "lowered": sorted({e.robot for e in events if e.code == codes.LOWERED}),
+        "lost": _lost_robots(traces.robots, end),
         "detect_ms": _first_notice(traces, events, moment, tick, missed),
         "stand_ms": _after(tick, _all_stand(traces.statuses, others, tick)),
         "recover_ms": None if recorded_end is None else _after(tick, _all_walk(traces, tick)),
@@ -117,7 +118,9 @@ def _first_notice(
     noticed += [
         event.tick - tick
         for event in events
-        if event.kind == "fault" and event.code not in _ANNOUNCED and event.tick >= tick
+        if event.tick >= tick
+        and event.code not in _ANNOUNCED
+        and (event.kind == "fault" or event.code == codes.COMMAND_LOST)
     ]
     if moment.wall_ns:
         by_recorder = int(traces.notes.get(END, {}).get("missed_ns", "0"))
@@ -145,7 +148,6 @@ def _all_stand(
 def _all_walk(traces: Traces, tick: int) -> int | None:
     """When the last robot went on for good; the fault's tick if none stopped; None: one did not."""
     newest = max((s[-1].tick for s in traces.statuses.values() if s), default=tick)
-    lowered = {event.robot for event in traces.events if event.code == codes.LOWERED}
     since = [tick]
     for name in traces.robots:
         statuses = [s for s in traces.statuses[name] if s.tick >= tick - _SILENT_MS]
@@ -153,16 +155,19 @@ def _all_walk(traces: Traces, tick: int) -> int | None:
             return None
         if newest - statuses[-1].tick > _SILENT_MS:
             return None
-        since += _stops(statuses, name in lowered)
+        since += [now.tick for before, now in itertools.pairwise(statuses) if _resumes(before, now)]
     return max(since)
 
 
-def _stops(statuses: Sequence[Status], lowered: bool) -> Iterator[int]:
-    """When a robot walked again after it had stopped, or had said nothing while it was led down."""
-    for before, now in itertools.pairwise(statuses):
-        silent = lowered and now.tick - before.tick > _SILENT_MS
-        if now.mode == _WALKS and (before.mode != _WALKS or silent):
-            yield now.tick
+def _resumes(before: Status, now: Status) -> bool:
+    return now.mode == _WALKS and before.mode != _WALKS
+
+
+def _lost_robots(robots: Sequence[str], end: Event | None) -> list[str]:
+    """Robots without whose commands the walk ended."""
+    if end is None or end.code != codes.COMMAND_LOST:
+        return []
+    return [name for name in robots if name in re.split(r"[, ]+", end.detail)]
 
 
 def _after(tick: int, later: int | None) -> int | None:

@@ -25,7 +25,7 @@ walked for good, 0 if none had stopped. "lost": what the recording lacks, the fa
 aside; in real time also commands of ticks that an agent did not answer."""
 _SAID_COLUMNS: Final = ("fault", "walked on", "stopped", "fell", "status", "doctor")
 _SAID_NOTE: Final = """\
-"walked on": all robots walked when the time was over; "stopped": somebody stopped, or was led down
+"walked on": all robots walked when the time was over; "stopped": somebody stopped
 by the world, and nobody fell. "status": why most robots no longer walked; "doctor": what `quadriga
 doctor` found wrong with most processes 1 s after the fault, in real time."""
 _MODES: Final = {"lockstep": "lock", "realtime": "real"}
@@ -102,7 +102,7 @@ def _has_own_fallen(row: dict[str, Any]) -> bool:
 
 def _has_walked_on(row: dict[str, Any]) -> bool:
     walks = all(what == "walk" for what in row["status"].values())
-    stopped = row["falls"] or row["lowered"]
+    stopped = row["falls"] or row["lost"]
     return walks and not stopped and code_of(row["end"]) == TIME_OVER
 
 

@@ -14,7 +14,6 @@ from typing import Any, Final
 import numpy as np
 
 from quadriga.faults.aftermath import await_end, consult_doctor, read_log
-from quadriga.faults.continued import ContinuedRecording
 from quadriga.faults.fault import Draw, FaultScene, Stage, TeamFault
 from quadriga.faults.outcome import Moment, describe_outcome
 from quadriga.faults.teller import LEAD_MS, FaultTeller
@@ -31,6 +30,7 @@ from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.runtime.atomic import write_text
 from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns
 from quadriga.shared.runtime.scheduling import go_first, leave_priority
+from quadriga.shared.recording.reader import Recording
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import Launch, process_table, router_row
 from quadriga.team.run_folder import CONFIG
@@ -152,7 +152,7 @@ class _FaultTrial:
 def _describe(config: Config, moment: Moment, folder: Path) -> dict[str, Any]:
     """What the recording says of it, as far as it can be read."""
     try:
-        recording = ContinuedRecording(folder / RECORDING)
+        recording = Recording(folder / RECORDING)
         told = list(parse_events(read_log(folder, SIM)))
         missed = list(_read_missed(folder))
         return describe_outcome(config, read_traces(recording), recording, moment, told, missed)

@@ -11,7 +11,6 @@ from typing import Any, Final
 import numpy as np
 
 from quadriga.agents.gait import nominal_forces
-from quadriga.agents.modes import DAMPING
 from quadriga.agents.predictor.episode import SIGNALS, Episode, output_base
 from quadriga.agents.predictor.hankel import required_samples
 from quadriga.identification.dataset import Dataset
@@ -19,6 +18,7 @@ from quadriga.identification.rollout import Rollout
 from quadriga.shared.config.sections import Config, WorldConfig
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.messages import Reference
+from quadriga.shared.modes import PASSIVE
 from quadriga.shared.robots.conventions import N_FORCES, Array, robot_names
 from quadriga.shared.topics import REFERENCE_EPOCH_MS as EPOCH_MS
 from quadriga.shared.topics import SAMPLE_MS
@@ -102,7 +102,7 @@ def collect_episode(config: Config, planned: PlannedEpisode) -> Episode | None:
     first = config.gait.stand_ms + SAMPLE_MS
     gave_up = False  # an agent that gave up ends the episode as a fall does
     for tick in rollout.ticks(walk.ticks + 1):
-        gave_up = any(out.mode == DAMPING for out in tick.outputs.values())
+        gave_up = any(out.mode == PASSIVE for out in tick.outputs.values())
         if gave_up:
             break
         if tick.tick % SAMPLE_MS or tick.tick < first:

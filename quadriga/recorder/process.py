@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from quadriga.recorder.continuation import choose_path
 from quadriga.recorder.parts import Parts
 from quadriga.recorder.selection import KeyFilter, Selection
 from quadriga.recorder.session import Session
-from quadriga.recordings.metadata import CONTINUES, build_metadata
+from quadriga.recordings.metadata import build_metadata
 from quadriga.shared.bus.discovery import REJOINS, await_members, join
 from quadriga.shared.bus.liveness import loss_error
 from quadriga.shared.bus.membership import members
@@ -23,7 +22,7 @@ from quadriga.shared.errors import ProcessError, RecordingError, system_reason
 from quadriga.shared.members import RECORDER, has_lead
 from quadriga.shared.recording.metadata import END
 from quadriga.shared.recording.quota import LARGEST, Quota
-from quadriga.shared.runtime.clock import monotonic, sleep
+from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.runtime.scheduling import precede_ordinary, take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
 from quadriga.shared.topics import EVENT
@@ -90,9 +89,7 @@ def run(
     paths = [path]
     try:
         with Bus.open(config.bus, config.team.name, RECORDER, stopped) as bus:
-            path, before = choose_path(path, lambda: _walks(bus, stopped), say)
             about = build_metadata(config, predictor_sha256) | selection.metadata()
-            about |= {CONTINUES: before.name} if before else {}
             with _open_parts(config, path, about, selection, keys) as parts:
                 paths = parts.paths
                 _subscribe(bus, keys)
@@ -114,16 +111,6 @@ def run(
             "room for the recording",
             "`quadriga recover` makes a whole file of what is there",
         ) from None
-
-
-def _walks(bus: Bus, stopped: Callable[[], bool]) -> bool:
-    """Whether the team walks; that nobody is heard of it takes a busy computer a while to know."""
-    deadline = monotonic() + _HEARD
-    while not has_lead(bus.members_at(READY)):
-        if stopped() or monotonic() > deadline:
-            return False
-        sleep(_LOOK)
-    return True
 
 
 def _open_parts(

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from quadriga.recordings.checks.continuation import Continuation
 from quadriga.recordings.checks.delay import Delay
 from quadriga.recordings.checks.ending import Ending
 from quadriga.recordings.checks.finding import Check, CheckedMessage, Finding
 from quadriga.recordings.checks.getting_up import GettingUp
 from quadriga.recordings.checks.limits import Friction, Torques
 from quadriga.recordings.checks.sequence import Ages, Gaps, Order
-from quadriga.recordings.metadata import CONTINUES, read_counts
+from quadriga.recordings.metadata import read_counts
 from quadriga.recordings.readable import open_readable
 from quadriga.shared.codec import decode
 from quadriga.shared.errors import MessageError, RecordingError
@@ -47,8 +46,6 @@ def check(path: Path) -> list[Finding]:
         Ages(config, getting_up),
         Ending(source.notes),
     )
-    if before := source.metadata.get(CONTINUES, ""):
-        checks = (*checks, Continuation(path, before))
     times = Finding("log times", "messages")
     for item in _decode_valid(source.entries(), schema, times):
         getting_up.look(item)

@@ -13,11 +13,11 @@ from typing import Final
 
 import numpy as np
 
-from quadriga.agents.modes import RISING, WALK
 from quadriga.recordings.truth import Ticks
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
 from quadriga.shared.messages import Status
+from quadriga.shared.modes import STANDING_UP, WALK
 from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.topics import COMMAND, MEASUREMENT, PLAN, SAMPLE_MS, STATE, TRUTH, Topic
@@ -97,7 +97,7 @@ def _missing_of_walk(
     """
     team, stand_ms, missing = config.team.name, config.gait.stand_ms, dict[str, int]()
     if not config.team.agent_command:
-        spans = _find_spans(statuses, lambda mode: mode != RISING)
+        spans = _find_spans(statuses, lambda mode: mode != STANDING_UP)
         found = _recorded_ticks(ticks, key := MEASUREMENT.key(team, name))
         missing[key] = _count_missing_within(spans, found, stand_ms, SAMPLE_MS, end, unsampled)
     if find_kind(config.planner.kind).publishes:

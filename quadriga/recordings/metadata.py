@@ -18,7 +18,6 @@ from quadriga.shared.recording.config import PLUGIN
 from quadriga.shared.recording.metadata import COUNTS
 from quadriga.shared.runtime.installed import package_versions
 
-CONTINUES: Final = "continues"  # of a recording: the file beside it that it goes on from
 _DIGITS: Final = 18  # of a number of messages that can be meant
 
 

@@ -1,21 +1,19 @@
-"""Why robots stopped that did not fall: as they say, and as the plant saw of who does not say."""
+"""Why robots stopped that did not fall: as they say, and as the end of the walk says."""
 
 from __future__ import annotations
 
-from typing import Final
+import re
 
 from quadriga.recordings.traces import Traces
-from quadriga.shared.codes import BACK, GONE, SILENT, with_detail
+from quadriga.shared.codes import COMMAND_LOST, with_detail
 from quadriga.shared.topics import COMMAND, STATE
-
-_LOST: Final = (GONE, SILENT)
 
 
 def find_stops(traces: Traces) -> dict[str, str]:
     """By process why it does not walk at the end: the reason in its last status.
 
-    A process may be frozen, and a controller of one's own need not say how it is. Where the plant's
-    last word of a robot is that its commands no longer come, or none ever came, that is the reason.
+    A process may be frozen, and a controller of one's own need not say how it is. Where the walk
+    ended since a robot's commands did not come any more, or none ever came, that is the reason.
     """
     last = {name: statuses[-1] for name, statuses in traces.statuses.items() if statuses}
     reasons = {name: status.reason for name, status in last.items() if status.reason}
@@ -27,10 +25,9 @@ def _find_lost(traces: Traces) -> dict[str, str]:
     team, count, lost = traces.config.team.name, traces.messages.get, dict[str, str]()
     for name in traces.robots:
         if count(STATE.key(team, name)) and not count(COMMAND.key(team, name)):
-            lost[name] = with_detail(SILENT, "it has never sent a command")
+            lost[name] = with_detail(COMMAND_LOST, "it has never sent a command")
     for event in traces.events:
-        if event.code in _LOST and event.robot in traces.robots:
-            lost[event.robot] = with_detail(event.code, event.detail)
-        elif event.code == BACK:
-            lost.pop(event.robot, None)
+        if event.code == COMMAND_LOST:
+            named = set(re.split(r"[, ]+", event.detail)).intersection(traces.robots)
+            lost |= dict.fromkeys(named, with_detail(event.code, event.detail))
     return lost

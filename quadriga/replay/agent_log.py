@@ -10,21 +10,21 @@ from typing import Final
 from quadriga.agents.agent import Agent
 from quadriga.agents.inbox.inbox import Inbox, Order, Source, decode_packet, order_of
 from quadriga.agents.inbox.intake_log import ANYONE
-from quadriga.agents.teammates import concerns_agents
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import RecordingError
-from quadriga.shared.messages import Consumed, Event
+from quadriga.shared.messages import Consumed
 from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.recording.reader import ChunkEntry, Recording
 from quadriga.shared.topics import (
     COMMAND,
     ESTOP,
+    EVENT,
     INPUTS,
     MEASUREMENT,
     PLAN,
+    REQUESTS,
     SAMPLE_MS,
     STATE,
-    WORDS,
     Topic,
 )
 
@@ -32,6 +32,7 @@ Packet = tuple[str, bytes]  # key, payload
 Serial = tuple[str, int, int]  # topic of an output and its order
 ALL_TOLD: Final = 1 << 62  # ms
 _REPORT_AFTER: Final = 2000  # entries
+_OUTLIVED_MS: Final = 1000  # of states after its last command: a process that did not see the end
 
 
 @dataclass(slots=True)
@@ -88,8 +89,12 @@ def read_agent_log(
         if count % _REPORT_AFTER == 0:
             progress(entry.tick)
     # A forged tick must not ask for years of steps.
-    log.last = min(log.last, max(log.states, default=-1))
+    newest = max(log.states, default=-1)
+    log.last = min(log.last, newest)
     _check_complete(log, recording, config, agent.robot)
+    saw_end = recording.complete and newest - log.last <= _OUTLIVED_MS
+    if config.world.mode == "realtime" and not saw_end:
+        log.told = max(log.records)
     return log
 
 
@@ -111,8 +116,8 @@ def _build_handlers(
 
     handlers: dict[str, Callable[[ChunkEntry], None]] = {}
     for key, (topic, sender) in inbox.topics.items():
-        if topic is not STATE:
-            sent_by = ANYONE if topic in WORDS else sender
+        if topic not in (STATE, EVENT):
+            sent_by = ANYONE if topic in REQUESTS else sender
             handlers[key] = _keep_received(log, topic, sent_by)
     handlers[STATE.key(team, robot)] = _keep_states(log)
     handlers[COMMAND.key(team, robot)] = keep_command
@@ -137,8 +142,7 @@ def _keep_received(log: AgentLog, topic: Topic, sender: str) -> Callable[[ChunkE
 
     def keep(entry: ChunkEntry) -> None:
         message = decode_packet(topic, entry.payload)
-        passes = not isinstance(message, Event) or concerns_agents(message)
-        if message is not None and passes:  # what is not valid, the agent dropped
+        if message is not None:  # what is not valid, the agent dropped
             by_order[order_of(message)].append((entry.key, entry.payload))
 
     return keep

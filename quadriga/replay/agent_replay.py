@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -15,7 +15,6 @@ from quadriga.replay.breakpoint import Breakpoint
 from quadriga.replay.comparison import Comparison, ReplayedStep, ReplayVerdict
 from quadriga.replay.config_changes import change_config, check_agents, format_changes
 from quadriga.replay.figure import Curves, draw
-from quadriga.replay.lives import first_tick, split_lives
 from quadriga.replay.outcome import ReplayOutcome, format_inputs
 from quadriga.replay.problem_saver import ProblemSaver
 from quadriga.replay.recorded_inputs import RecordedInputs
@@ -62,7 +61,7 @@ def replay_agent(
     *,
     handed_over: bool = True,
 ) -> ReplayOutcome:
-    """Replay one robot; in the middle of each life a second agent goes on with the first's memory.
+    """Replay one robot; in the middle a second agent goes on with the first's memory.
 
     Of a planner that keeps state elsewhere the rest is then not equal any more.
 
@@ -86,18 +85,12 @@ def replay_agent(
     log = read_agent_log(recording, config, recorded, inbox, lambda tick: show("reading", tick))
     curves = Curves(config.planner.applied) if changed else None
     comparison = Comparison(log, None if curves is None else curves.add)
-    lives = split_lives(log, paced=config.world.mode == "realtime", whole=recording.complete)
-    begins = tuple(map(first_tick, lives))  # now: what is replayed is taken out of the logs
-    middles = [(begin + life.last) // 2 for begin, life in zip(begins, lives, strict=True)]
+    middle = (min(log.states, default=-1) + log.last) // 2
+    inputs = RecordedInputs(config, recorded, Inbox(config, job.robot, recorded.peers), log)
     with collector_off():  # a long log need not be looked through again and again
-        for life, middle in zip(lives, middles, strict=True):
-            inbox = Inbox(config, job.robot, recorded.peers)
-            inputs = RecordedInputs(config, recorded, inbox, life)
-            agents = current, second
-            _replay_steps(agents, middle, inputs, comparison, show, stop_at, changed=bool(changed))
-            if comparison.verdict.missing and not changed:
-                break  # nothing after it could be equal but by chance
-            comparison.end_life(life)
+        agents = current, second
+        _replay_steps(agents, middle, inputs, comparison, show, stop_at, changed=bool(changed))
+        comparison.pass_untold(log)
     verdict = comparison.finish()
     wall = monotonic() - begun
     drawn = () if curves is None else (_draw_curves(job, curves, changed),)
@@ -110,17 +103,16 @@ def replay_agent(
         wall=wall,
         inputs="" if verdict.step is None else format_inputs(verdict.step),
         files=(*(drawn or _save_problem(job, current, verdict)), *saved),
-        lives=begins,
-        stateful=handed_over and _is_stateful(job, verdict, middles),
+        stateful=handed_over and _is_stateful(job, verdict, middle),
     )
     verdict.step = None  # not to be carried between processes
     return outcome
 
 
-def _is_stateful(job: ReplayJob, verdict: ReplayVerdict, middles: Sequence[int]) -> bool:
+def _is_stateful(job: ReplayJob, verdict: ReplayVerdict, middle: int) -> bool:
     """Whether the first difference is there only because another agent went on in the middle."""
     first = verdict.first
-    if first is None or all(first.tick < middle for middle in middles):
+    if first is None or first.tick < middle:
         return False
     again = replay_agent(job, handed_over=False).verdict
     return again.first is None or again.first.tick > first.tick

@@ -121,11 +121,11 @@ class Comparison:
         if old is not None:
             self._on_pair(old, message)
 
-    def end_life(self, log: AgentLog) -> None:
-        """Pass over what a process sent, and is not recomputed, after it last told what it took in.
+    def pass_untold(self, log: AgentLog) -> None:
+        """Pass over what a killed agent sent, and is not recomputed, after its last record.
 
         Args:
-            log: of the process, see `quadriga.replay.lives`.
+            log: of the agent.
         """
         if log.told >= log.last:
             return

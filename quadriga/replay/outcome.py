@@ -29,7 +29,6 @@ class ReplayOutcome:
         wall: time that reading and replaying took, s.
         inputs: what the agent took in at the first difference, in short.
         files: what was left behind: the figure of a change, the problem at a difference.
-        lives: first tick of each process that the agent had: it may have been started again.
         stateful: whether all would be equal up to there, had one agent made the whole replay.
     """
 
@@ -40,7 +39,6 @@ class ReplayOutcome:
     wall: float
     inputs: str = ""
     files: tuple[Path, ...] = ()
-    lives: tuple[int, ...] = ()
     stateful: bool = False
 
     @property
@@ -65,9 +63,6 @@ def format_outcome(outcome: ReplayOutcome) -> str:
     """One line for a robot, more where something differs."""
     lines = [f"{outcome.robot}: {_format_counts(outcome)}; {_format_pace(outcome)}"]
     verdict = outcome.verdict
-    if len(outcome.lives) > 1:
-        begins = ", ".join(map(str, outcome.lives))
-        lines.append(f"  {len(outcome.lives)} lives, each replayed by itself, from ticks {begins}")
     if outcome.changed:
         lines.append(f"  changed: {outcome.changed}")
     if verdict.first is not None:

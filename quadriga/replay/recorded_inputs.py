@@ -14,11 +14,11 @@ from quadriga.agents.planning.interface import NOTHING
 from quadriga.replay.agent_log import AgentLog, Packet
 from quadriga.shared.config.sections import Config
 from quadriga.shared.messages import Consumed, State
-from quadriga.shared.topics import INPUTS, MEASUREMENT, SAMPLE_MS, STATE, WORDS
+from quadriga.shared.topics import INPUTS, MEASUREMENT, REQUESTS, SAMPLE_MS, STATE
 
 _BEFORE: Final = (-1, 0)
 _LONGEST_GAP: Final = 1000  # ticks without a state or a record that are gone through one by one
-_WORDS: Final = frozenset(word.name for word in WORDS)
+_WORDS: Final = frozenset(word.name for word in REQUESTS)
 
 
 @dataclass(frozen=True, slots=True)

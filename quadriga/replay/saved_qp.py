@@ -102,7 +102,7 @@ def problems_of(agent: Agent, before: AgentState, inputs: Inputs, about: str) ->
         inputs: what it took in.
         about: which step this is, in words.
     """
-    if agent.gets_up(before, inputs):
+    if agent.stands_up(before, inputs):
         return {}
     problems = agent.problems_of(before, inputs)
     saved = {WHOLE_BODY: _save_whole_body(problems, about)}

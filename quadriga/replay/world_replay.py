@@ -7,8 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Final
 
-from quadriga.plant.late import damp_joints
-from quadriga.plant.lost import LostCommands
+from quadriga.plant.commands import damp_joints
 from quadriga.recordings.by_tick import by_tick
 from quadriga.replay.difference import Difference, find_difference
 from quadriga.shared import codes
@@ -44,15 +43,13 @@ class WorldComparison:
 def replay_world(recording: Recording) -> Iterator[WorldComparison]:
     """Recompute the world tick by tick; the last value is the outcome.
 
-    A robot that the world had given up on at a tick, by the recorded events, is silent at
-    that tick again, even if its late command was recorded. An emergency stop damps all again,
-    until it is released.
+    An emergency stop damps all again, until it is released.
 
     Raises:
         RecordingError: not of a lock-step world, or with commands missing from the file.
     """
     config = read_computable_config(recording)
-    world, heard, lost_commands = World(config), _Heard(), LostCommands(config)
+    world, heard = World(config), _Heard()
     keys = {
         name: (STATE.key(config.team.name, name), COMMAND.key(config.team.name, name))
         for name in world.names
@@ -79,14 +76,14 @@ def replay_world(recording: Recording) -> Iterator[WorldComparison]:
         heard.take(config.team.name, entries)
         for fault in heard.pop_faults():
             world.add_fault(fault)
-        commands = _choose_commands(keys, entries, heard.silent)
-        absent = [name for name in world.names if name not in {*commands, *heard.silent}]
+        commands = _choose_commands(keys, entries)
+        absent = [name for name in world.names if name not in commands]
         if heard.estop:
             world.step({name: damp_joints(tick) for name in world.names})
         elif absent:
             lost = f"no command of {', '.join(absent)} at tick {tick}"
         else:
-            world.step(lost_commands.fill(tick, world.names, commands, world.states))
+            world.step(commands)
         yield WorldComparison(tick + 1, compared)
     if compared and recording.cut:
         yield WorldComparison(tick + 1, compared, recording.cut)
@@ -135,15 +132,13 @@ def read_computable_config(recording: Recording) -> Config:
 
 @dataclass(slots=True)
 class _Heard:
-    """What the world announced of commands that it did not take, and of what it was asked for.
+    """What the world announced of what it was asked for.
 
     Attributes:
-        silent: robots that it does not wait for.
         estop: whether an emergency stop is in force.
         faults: that somebody has asked for, as in `world.faults`.
     """
 
-    silent: set[str] = field(default_factory=set)
     estop: bool = False
     faults: list[str] = field(default_factory=list)
 
@@ -155,10 +150,6 @@ class _Heard:
     def take(self, team: str, entries: Iterable[ChunkEntry]) -> None:
         """Take in the events of a tick."""
         for _, event in _decode_valid(Event, EVENT.key(team), entries):
-            if event.code == codes.BACK:
-                self.silent.discard(event.robot)
-            elif event.code in (codes.SILENT, codes.GONE):
-                self.silent.add(event.robot)
             if event.code in (codes.ESTOPPED, codes.RESET):
                 self.estop = event.code == codes.ESTOPPED
             if event.code == codes.FAULT_ASKED:
@@ -197,12 +188,12 @@ def _compare(world: World, config: Config, entries: Iterable[ChunkEntry]) -> int
 
 
 def _choose_commands(
-    keys: Mapping[str, tuple[str, str]], entries: Sequence[ChunkEntry], silent: set[str]
+    keys: Mapping[str, tuple[str, str]], entries: Sequence[ChunkEntry]
 ) -> dict[str, Command]:
-    """What each robot that was not silent commanded in a tick, by robot in the team's order."""
+    """What each robot commanded in a tick, by robot in the team's order."""
     commands = {}
     for name, (state, command) in keys.items():
-        valid = [] if name in silent else list(_decode_valid(Command, command, entries))
+        valid = list(_decode_valid(Command, command, entries))
         if valid:
             asked = [entry.log_time_ns for entry in entries if entry.key == state]
             commands[name] = _choose_taken(valid, min(asked, default=0))

@@ -9,13 +9,13 @@ from typing import Final
 
 import numpy as np
 
-from quadriga.agents.modes import DAMPING, ESTOP, STAND, WALK
 from quadriga.agents.planner.qp_solver import SOLVED
 from quadriga.recordings.traces import Traces
 from quadriga.recordings.truth import Ticks
 from quadriga.shared.codes import FALL, code_of
 from quadriga.shared.config.timing import periods
 from quadriga.shared.messages import Plan, Status
+from quadriga.shared.modes import ESTOP, PASSIVE, STAND, WALK
 from quadriga.shared.topics import MEASUREMENT, STATE, TRUTH
 
 FAULT: Final = "fault"
@@ -93,7 +93,7 @@ def _find_mode_changes(robot: str, statuses: Sequence[Status]) -> Iterator[Timel
             continue
         if status.reason and status.reason != before[1]:
             text = f"{status.reason} ({status.mode})"
-            code, passive = code_of(status.reason), status.mode in (DAMPING, ESTOP)
+            code, passive = code_of(status.reason), status.mode in (PASSIVE, ESTOP)
             tick = status.tick
             yield TimelineEntry(tick, tick, robot, STOP, text, code, passive=passive)
         elif before[0] and status.mode not in (WALK, before[0]):

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from quadriga.agents.modes import RISING, STAND, WALK
 from quadriga.doctor.health import WELL
 from quadriga.recordings.late_commands import overloaded
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import max_ages
+from quadriga.shared.modes import STAND, STANDING_UP, WALK
 from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.topics import STATUS
 from quadriga.status.record import Account, MemberStatus, TeamReading
@@ -17,7 +17,7 @@ from quadriga.status.record import Account, MemberStatus, TeamReading
 # Share of a key's messages that did not come, of which is spoken: a listener on a busy machine
 # misses some that the team itself has.
 _LOST: Final = 0.01
-_SOUND: Final = frozenset((STAND, WALK, RISING))
+_SOUND: Final = frozenset((STAND, WALK, STANDING_UP))
 
 
 def find_problems(

@@ -12,7 +12,6 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from rich.console import Console
 
-from quadriga.agents.modes import ESTOP, STAND
 from quadriga.agents.predictor.store import predictor_sha256
 from quadriga.drive.client import ControlLink, socket_path
 from quadriga.drive.driver_words import WHERE
@@ -23,6 +22,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.errors import BusError, ProcessError
 from quadriga.shared.members import OPERATOR
+from quadriga.shared.modes import ESTOP, STAND
 from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.runtime.atomic import write_text

@@ -8,10 +8,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from quadriga.agents.modes import ESTOP, STAND
 from quadriga.shared import codes
 from quadriga.shared.codec import decode
 from quadriga.shared.messages import Event, Status
+from quadriga.shared.modes import ESTOP, STAND
 from quadriga.shared.runtime.record import record
 from quadriga.shared.topics import STATUS, topic_of
 from quadriga.tables import NOTHING, Table

@@ -11,11 +11,11 @@ from urllib.parse import urlsplit
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
-from quadriga.agents.modes import DAMPING, ESTOP, STAND, WALK
 from quadriga.drive.driver_words import DRIVE, GO_ON, NEWS, RESET, TAKE
 from quadriga.drive.driver_words import ESTOP as STOP_AT_ONCE
 from quadriga.drive.wish import NAMES, Wish
 from quadriga.shared.errors import ProcessError
+from quadriga.shared.modes import ESTOP, PASSIVE, STAND, WALK
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns
 
 _PERIOD: Final = 0.05  # s, between two of what the page asks for
@@ -73,7 +73,7 @@ class PageDriver:
             news = self._news
             if news and news["driver"] != news["you"]:
                 self._say(self._drive, TAKE)
-            elif any(robot["mode"] in (ESTOP, DAMPING) for robot in self._robots().values()):
+            elif any(robot["mode"] in (ESTOP, PASSIVE) for robot in self._robots().values()):
                 self._say(self._drive, RESET, text=_BY)
             elif self.are_all(STAND, WALK):
                 self._say(self._drive, GO_ON)

@@ -162,23 +162,6 @@ class Launch:
     def _log_of(self, row: ProcessSpec) -> Path:
         return self._logs / f"{row.name}.log"
 
-    def restart(self, name: str) -> None:
-        """Start a row again whose process has ended, by the same command; its log goes on.
-
-        Raises:
-            ProcessError: it has no row, or its process still runs after its grace.
-        """
-        row = self._rows.get(name)
-        if row is None:
-            raise ProcessError(f"process {name}", "no row", f"one of {', '.join(self._rows)}")
-        before = self._running.get(name)
-        if before is not None:
-            try:
-                before.wait(row.grace)
-            except subprocess.TimeoutExpired:
-                raise self._error(name, "still running", "an end before it is restarted") from None
-        self._start(row)
-
     @property
     def pids(self) -> dict[str, int]:
         """Process id of each that still runs, by name."""

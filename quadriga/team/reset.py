@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Final
 
-from quadriga.agents.modes import STAND, WALK
 from quadriga.shared import members
 from quadriga.shared.codec import truncate_text
 from quadriga.shared.config.sections import Config
 from quadriga.shared.messages import Reset, Resume
+from quadriga.shared.modes import STAND, WALK
 from quadriga.shared.topics import RESET, RESUME
 from quadriga.team.resume import PATIENCE
 from quadriga.team.talk import Say, TeamTalk, keep_quiet

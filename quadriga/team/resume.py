@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from typing import Final
 
-from quadriga.agents.healing import WORD_MS
-from quadriga.agents.modes import WALK
+from quadriga.agents.modes import REQUEST_MS
 from quadriga.shared import members
 from quadriga.shared.config.sections import Config
 from quadriga.shared.messages import Resume
+from quadriga.shared.modes import WALK
 from quadriga.shared.topics import RESUME
 from quadriga.team.talk import Say, TeamTalk, keep_quiet
 
-PATIENCE: Final = 1e-3 * WORD_MS + 1.0  # s, in which robots that may go on do so
+PATIENCE: Final = 1e-3 * REQUEST_MS + 1.0  # s, in which robots that may go on do so
 
 
 def resume_team(config: Config, tell: Say = keep_quiet) -> tuple[bool, str]:

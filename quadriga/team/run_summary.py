@@ -7,12 +7,12 @@ from typing import Any, Final
 
 from rich.console import Console
 
-from quadriga.agents.modes import is_commanded
 from quadriga.recordings.summary import RECORDING, summarise
 from quadriga.recordings.summary_table import print_summary
 from quadriga.recordings.traces import read_traces
 from quadriga.shared.codes import CLOCK_SET, LEAD_GONE, LINK_LOST, PLANT_FAILED, PLANT_GONE, SIGNAL
 from quadriga.shared.errors import ProcessError
+from quadriga.shared.modes import is_commanded
 from quadriga.shared.recording.reader import Recording
 
 # Of an end that should not be, by the code of its event; "" where none was recorded.

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Final
 
-from quadriga.agents.modes import DAMPING, ESTOP, STAND
 from quadriga.shared import members
 from quadriga.shared.codec import truncate_text
 from quadriga.shared.codes import STOP_ASKED
 from quadriga.shared.config.sections import Config
 from quadriga.shared.messages import SafeStop
+from quadriga.shared.modes import ESTOP, PASSIVE, STAND
 from quadriga.shared.topics import STOP
 from quadriga.team.talk import Say, TeamTalk, keep_quiet
 
@@ -45,7 +45,7 @@ def stop_safely(
         asked = f"asked {', '.join(talk.agents)}; waiting until"
         if not ends:
             tell(f"{asked} all stand, at most {_PATIENCE:g} s")
-            stand = (STAND, DAMPING, ESTOP)
+            stand = (STAND, PASSIVE, ESTOP)
             talk.follow(lambda: _is_heard(talk) and talk.all_are(*stand), _PATIENCE)
             return _is_heard(talk) and talk.all_are(*stand), talk.describe() + _doubt(talk)
         tell(f"{asked} the walk is over, at most {_END_PATIENCE:g} s")

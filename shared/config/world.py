@@ -123,7 +123,7 @@ class WorldConfig:
     command_timeout: float = key(
         10.0,
         "s wall",
-        "lockstep: a robot silent longer is put into damping; with a planner at least 1 s more "
+        "lockstep: the walk ends if a robot is silent for longer; with a planner at least 1 s more "
         "than planner.peer_timeout",
         low=0.05,
         high=60.0,
@@ -132,18 +132,7 @@ class WorldConfig:
         20, "ms", "realtime: a command older than this is replaced by holding", low=1, high=1000
     )
     command_damp_ms: int = key(
-        200,
-        "ms",
-        "realtime: a command older than this is lost, see lost_command",
-        low=1,
-        high=10000,
-    )
-    lost_command: str = key(
-        "lower",
-        "-",
-        "simulated robots whose commands are lost: lower: led down slowly and then damped, which "
-        "is no fall; damp: damped at once",
-        choices=("lower", "damp"),
+        200, "ms", "realtime: a command older than this is lost: the walk ends", low=1, high=10000
     )
 
     @property

@@ -10,7 +10,7 @@ from typing import Final
 import mujoco
 import numpy as np
 
-from quadriga.plant.late import damp_joints
+from quadriga.plant.commands import damp_joints
 from quadriga.plant.protocol import Plant
 from quadriga.shared.codes import FALL, FAULT_ASKED, LIES, UNSTABLE
 from quadriga.shared.config.sections import Config
@@ -27,7 +27,7 @@ from quadriga.sim_server.world.team_model import build_team_model
 
 _FALL_COSINE: Final = math.cos(1.0)  # of the angle between the trunk's z axis and the vertical
 _FALL_HEIGHT: Final = 0.12  # m, trunk origin above the mean terrain under the hips
-_RISEN: Final = 0.06  # m, above that height a robot is up again that was led down
+_RISEN: Final = 0.06  # m, above that height a robot is up again that was stopped
 _DAMPED: Final = damp_joints(0)
 # Of positions, speeds or accelerations that are no numbers, or huge.
 _UNSTABLE: Final = slice(mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQACC + 1)
@@ -95,10 +95,9 @@ class World(Plant):
         self._feet_under_hips = config.robot.feet_under_hips
         self._fallen = [False] * n
         self._down: tuple[str, ...] = ()  # names of these
-        # Names of those that go down, and with them of those that have not risen since.
-        self._led_down, self._lying = frozenset[str](), frozenset[str]()
-        self._stopped = frozenset[str]()  # by an emergency stop that is in force
-        self._sunk, self._tipped = set[str](), set[str]()  # of these, those that have since
+        self._stopped = frozenset[str]()  # names of those that an emergency stop damps
+        self._excused = set[str]()  # with them, those that have not been up since
+        self._lying = set[str]()  # of these, those that have gone to the ground
         self._surely_up = _FALL_HEIGHT + self.team.terrain.top
         # Compiled functions are compiled, or loaded, now and not in the first tick.
         Motors(config.robot, config.motors, n, _DAMPED).drive(
@@ -126,7 +125,7 @@ class World(Plant):
         """Advance by one tick under the motors' torques and return what happened.
 
         The motors follow the commands as `motors` tells, a weak one with its share of the torque.
-        Those of a robot without a command damp its joints, see `quadriga.plant.late`.
+        Those of a robot without a command damp its joints, see `quadriga.plant.commands`.
         """
         events = list(self._events.get(self.tick, ()))
         if self.tick in self._push_changes:
@@ -201,10 +200,9 @@ class World(Plant):
         """Robots that have fallen so far."""
         return self._down
 
-    def expect_down(self, lowered: Collection[str], stopped: Collection[str] = ()) -> None:
-        self._led_down = frozenset((*lowered, *stopped))
-        self._lying |= self._led_down
+    def expect_down(self, stopped: Collection[str]) -> None:
         self._stopped = frozenset(stopped)
+        self._excused |= self._stopped
 
     def _measure(self) -> dict[str, State]:
         states = self._sensors.measure(
@@ -232,7 +230,7 @@ class World(Plant):
         for i, (x, y, z, qw, qx, qy, qz) in enumerate(self._q[:, layout.POSE].tolist()):
             cosine = 1.0 - 2.0 * (qx * qx + qy * qy)
             if cosine >= _FALL_COSINE and z >= self._surely_up:
-                if self._lying and z >= self._surely_up + _RISEN:
+                if self._excused and z >= self._surely_up + _RISEN:
                     self._note_up(self.names[i])
                 continue
             if self._fallen[i]:
@@ -244,28 +242,24 @@ class World(Plant):
                     np.array(x), np.array(y), np.array(yaw), self._feet_under_hips
                 )
             )
-            name = self.names[i]
-            may_tip = name in self._tipped or name in self._stopped
-            level, high = cosine >= _FALL_COSINE, above >= _FALL_HEIGHT
-            if name in self._lying and level and above >= _FALL_HEIGHT + _RISEN:
-                self._note_up(name)
+            name, level = self.names[i], cosine >= _FALL_COSINE
+            if level and above >= _FALL_HEIGHT:
+                if above >= _FALL_HEIGHT + _RISEN:
+                    self._note_up(name)
+                continue
             detail = f"tilt {math.acos(max(-1.0, cosine)):.2f} rad, height {above:.3f} m"
-            if not ((level or may_tip) and (high or name in self._lying)):
+            if name not in self._excused:
                 self._fallen[i] = True
                 pairs = zip(self.names, self._fallen, strict=True)
                 self._down = tuple(name for name, down in pairs if down)
                 events.append(Event.of(self.tick, FALL, name, detail))
-            elif name in self._stopped and not (level and high):
-                if not level:
-                    self._tipped.add(name)
-                if name not in self._sunk:
-                    self._sunk.add(name)
-                    events.append(Event.of(self.tick, LIES, name, f"{detail}: no fall"))
+            elif name not in self._lying:
+                self._lying.add(name)
+                events.append(Event.of(self.tick, LIES, name, f"{detail}: no fall"))
         return events
 
     def _note_up(self, name: str) -> None:
-        """A robot is up again, unless it is being led down."""
-        if name not in self._led_down:
-            self._lying -= {name}
-            self._sunk.discard(name)
-            self._tipped.discard(name)
+        """A robot is up, and if it falls from now on, it falls; unless it is still stopped."""
+        if name not in self._stopped:
+            self._excused.discard(name)
+            self._lying.discard(name)

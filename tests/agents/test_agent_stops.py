@@ -13,8 +13,7 @@ from quadriga.agents.controller.whole_body.problem import WholeBodySolution
 from quadriga.agents.telemetry import Telemetry
 from quadriga.agents.validate import AGREES_MS, HOLD_MS
 from quadriga.shared.codec import decode, encode
-from quadriga.shared.codes import OPERATOR_BACK, OPERATOR_GONE
-from quadriga.shared.messages import Command, EStop, Event, State, Status
+from quadriga.shared.messages import Command, EStop, State, Status
 from quadriga.shared.robots.conventions import GRAVITY, Array
 from tests.a1 import standing
 from tests.agents.duet import CONFIG, FIRST_PLAN, over_the_bus
@@ -44,7 +43,7 @@ def test_a_status_can_be_read_whatever_the_reason_of_a_stop() -> None:
 def test_an_emergency_stop_outranks_a_fall() -> None:
     robot = Robot()
     robot.run(400)
-    assert lean(robot, 1.2).mode == "damping"
+    assert lean(robot, 1.2).mode == "passive"
     now = robot.tick
     outputs = robot.step(tilted(now, 1.2), estop=EStop(now, now, "operator"))
     assert (outputs.mode, outputs.reason) == ("estop", "estop:operator")
@@ -61,7 +60,7 @@ def test_a_tilt_beyond_the_limit_is_a_fall(sign: float) -> None:
     outputs = lean(robot, beyond, begun=below)
     for _ in range(20):  # also once it is upright again
         assert is_damping(outputs)
-        assert (outputs.mode, outputs.reason) == ("damping", "fall")
+        assert (outputs.mode, outputs.reason) == ("passive", "fall")
         outputs = robot.step()
 
 
@@ -74,7 +73,7 @@ def test_a_robot_that_points_straight_up_or_down_has_fallen(sign: float) -> None
         assert not is_damping(robot.step(over_the_bus(pointing(robot.tick, quat))))
     outputs = robot.step(over_the_bus(pointing(robot.tick, quat)))
     assert is_damping(outputs)
-    assert (outputs.mode, outputs.reason) == ("damping", "fall")
+    assert (outputs.mode, outputs.reason) == ("passive", "fall")
 
 
 def pointing(tick: int, quat: Array) -> State:
@@ -165,7 +164,7 @@ def test_without_a_solution_the_last_torques_hold_and_then_the_joints_are_damped
         assert (outputs.mode, outputs.counters["qp_failed"]) == ("walk", failures)
     outputs = robot.step()
     assert is_damping(outputs)
-    assert (outputs.mode, outputs.reason) == ("damping", "qp-infeasible:-1")
+    assert (outputs.mode, outputs.reason) == ("passive", "qp-infeasible:-1")
     monkeypatch.undo()
     assert is_damping(robot.step())
 
@@ -249,23 +248,6 @@ def test_a_lost_reference_makes_the_robot_slow_down_and_stand() -> None:
     outputs = robot.run(2200)
     assert (outputs.mode, outputs.reason) == ("stand", "reference-lost")
     assert np.abs(outputs.command.tau).max() > 1.0  # it holds itself up
-
-
-def test_a_robot_whose_operator_has_left_stops_at_once_whatever_it_has_been_asked() -> None:
-    robot = Robot(replace(ALONE, team=replace(ALONE.team, auto_resume=True)))
-    assert robot.run(650).mode == "walk"
-    robot.references = False
-    outputs = robot.step(events=(Event.of(640, OPERATOR_GONE, "", "operator gone"),))
-    assert (outputs.mode, outputs.reason) == ("stopping", "reference-lost")
-    assert outputs.ages_ms["reference"] == 50.0
-    assert robot.run(1301).mode == "stand"
-    robot.references = True
-    robot.run(1500)
-    robot.step(events=(Event.of(1500, OPERATOR_BACK, "", "there again"),))
-    begun, whole_ms = robot.tick, round(1000 * ALONE.team.resume_after)
-    while robot.step().mode == "stand":
-        assert robot.tick < begun + whole_ms + 500
-    assert robot.tick > begun + whole_ms
 
 
 def test_a_peer_that_never_answers_makes_the_robot_stop() -> None:

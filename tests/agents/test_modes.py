@@ -1,155 +1,293 @@
-"""Modes: the normal course, safe stops, and what is latched."""
+"""When a robot stops for the others, and when one that stood walks again, and how fast."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
+from quadriga.agents.agent import Inputs, Outputs
 from quadriga.agents.modes import (
-    DAMPING,
-    ESTOP,
-    RISING,
-    SLOW_DOWN_MS,
-    STAND,
-    STOPPING,
-    WALK,
-    Mode,
-    Stop,
-    enter_passive,
-    resolve_stops,
-    step_mode,
-    stop_safely,
+    GRACE_MS,
+    RAMP_MS,
+    REQUEST_MS,
+    SILENCE_MS,
+    ModeRules,
+    Resume,
+    change_event,
+    ramp,
 )
+from quadriga.agents.validate import AGREES_MS
+from quadriga.identification.rollout import Rollout
+from quadriga.shared import messages as msg
+from quadriga.shared.codes import HALTS, INPUT_LOST, RESUMED
+from quadriga.shared.config.load import load
+from quadriga.shared.config.sections import Config
+from quadriga.shared.messages import EStop, SafeStop, Status
+from quadriga.shared.modes import COMMANDED, ESTOP, LOSSES, PASSIVE, STAND, STOPPING, WALK, Mode
+from tests.a1 import standing
+from tests.agents.duet import CONFIG, asked, every_100_ms, simple_predictor
+from tests.agents.lone_robot import ALONE, Robot, tilted
 
-STAND_MS = 300
-
-
-def test_a_robot_stands_then_walks() -> None:
-    mode = Mode(STAND, 0)
-    for tick in range(STAND_MS):
-        mode = step_mode(mode, tick, STAND_MS, half_cycle_ends=True)
-        assert mode == Mode(STAND, 0)
-        assert mode.speed_factor(tick) == 0.0
-    mode = step_mode(mode, STAND_MS, STAND_MS, half_cycle_ends=True)
-    assert mode == Mode(WALK, STAND_MS)
-    assert mode.speed_factor(10**6) == 1.0
-    assert step_mode(mode, 10**6, STAND_MS, half_cycle_ends=True) is mode
-
-
-def test_a_safe_stop_slows_down_and_stands_at_the_end_of_a_stance_for_good() -> None:
-    mode = stop_safely(Mode(WALK, STAND_MS), 1050, "reference-lost")
-    assert mode == Mode(STOPPING, 1050, "reference-lost")
-    factors = [mode.speed_factor(1050 + since) for since in range(0, SLOW_DOWN_MS + 200, 50)]
-    assert factors[0] == 1.0
-    assert factors == sorted(factors, reverse=True)
-    assert factors[-1] == 0.0
-    early, done = 1050 + SLOW_DOWN_MS - 1, 1050 + SLOW_DOWN_MS
-    assert step_mode(mode, early, STAND_MS, half_cycle_ends=True) is mode
-    assert step_mode(mode, done, STAND_MS, half_cycle_ends=False) is mode
-    stood = step_mode(mode, done, STAND_MS, half_cycle_ends=True)
-    assert (stood.name, stood.reason) == (STAND, "reference-lost")
-    assert step_mode(stood, 10**6, STAND_MS, half_cycle_ends=True) is stood
+AUTO = replace(ALONE, team=replace(ALONE.team, auto_resume=True))
+RESUME_MS = round(1000 * ALONE.team.resume_after)
+LOST = Mode(STAND, 1700, "reference-lost")
+BEGIN = 8100  # tick, 300 + k · 200: a half cycle begins
 
 
-def test_a_stop_before_walking_keeps_the_robot_standing() -> None:
-    mode = stop_safely(Mode(STAND, 0), 100, "peer-lost:r2")
-    assert mode == Mode(STAND, 100, "peer-lost:r2")
-    assert step_mode(mode, STAND_MS, STAND_MS, half_cycle_ends=True) is mode
+def begins(config: Config, mode: Mode, since: int, requested: int = -1, tick: int = BEGIN) -> bool:
+    """Whether a robot in a mode, whose inputs are there since a tick, walks at a later one."""
+    resume = Resume(inputs_ok_since=since, requested=requested)
+    return ModeRules(config, "r1").course(mode, resume, tick - 1, tick)[0] == Mode(WALK, tick)
+
+
+@pytest.mark.parametrize("reason", sorted(LOSSES))
+def test_after_a_loss_it_resumes_once_all_inputs_have_been_there_for_a_second(reason: str) -> None:
+    mode = Mode(STAND, 1700, f"{reason}:r2")
+    assert begins(AUTO, mode, BEGIN - RESUME_MS)
+    assert not begins(AUTO, mode, BEGIN - RESUME_MS + 1)
+    assert not begins(AUTO, mode, BEGIN - RESUME_MS, tick=BEGIN + 1), "in the midst of a half cycle"
+    assert not begins(ALONE, mode, BEGIN - RESUME_MS)
+    assert begins(ALONE, mode, BEGIN - RESUME_MS, requested=BEGIN - REQUEST_MS)
+    assert not begins(ALONE, mode, BEGIN - RESUME_MS, requested=BEGIN - REQUEST_MS - 1)
+
+
+@pytest.mark.parametrize("reason", sorted(COMMANDED))
+def test_after_a_stop_or_a_reset_it_resumes_only_when_asked_to(reason: str) -> None:
+    mode = Mode(STAND, 1700, f"{reason}:ann")
+    assert not begins(AUTO, mode, 2000)
+    assert begins(AUTO, mode, 2000, requested=3000)
 
 
 @pytest.mark.parametrize(
     "mode",
-    [Mode(STOPPING, 5, "a"), Mode(STAND, 5, "a"), Mode(DAMPING, 5, "a"), Mode(ESTOP, 5, "a")],
+    [
+        Mode(PASSIVE, 5, "fall"),
+        Mode(ESTOP, 5, "estop:reference-lost"),
+        Mode(STAND, 5, "balance-lost"),
+        Mode(STOPPING, BEGIN - 5, "reference-lost"),
+    ],
 )
-def test_a_later_reason_to_stop_does_not_replace_the_first(mode: Mode) -> None:
-    assert stop_safely(mode, 10, "b") is mode
+def test_from_nothing_else_it_resumes(mode: Mode) -> None:
+    assert not begins(AUTO, mode, 10, requested=BEGIN - 10)
 
 
-@pytest.mark.parametrize("name", [STAND, STOPPING, RISING])
-def test_what_somebody_asks_for_takes_the_place_of_a_loss_and_no_loss_of_it(name: str) -> None:
-    lost, asked = Mode(name, 5, "peer-lost:r2"), Mode(name, 5, "stopped:ann")
-    assert stop_safely(lost, 10, "stopped:ann") == asked
-    assert stop_safely(lost, 10, "reference-lost") is lost
-    assert stop_safely(asked, 10, "peer-lost:r2") is asked
-    assert stop_safely(asked, 10, "stopped:bob") is asked
+def test_references_rise_from_nothing_within_a_second() -> None:
+    references = tuple(replace(asked(0.4), tick=tick) for tick in range(4000, 6000, 100))
+    assert ramp(references, Resume(), 5000) is references
+    followed = ramp(references, Resume(resumed=4500), 5000)
+    speeds = {item.tick: item.vx for item in followed}
+    assert (speeds[4000], speeds[4500]) == (0.0, 0.0)
+    assert speeds[4500 + RAMP_MS // 2] == pytest.approx(0.2)
+    assert followed[-1] is references[-1]
 
 
-@pytest.mark.parametrize("mode", [Mode(STAND, 0), Mode(WALK, 1), Mode(STOPPING, 2, "a")])
-@pytest.mark.parametrize("name", [DAMPING, ESTOP])
-def test_any_mode_can_enter_passive(mode: Mode, name: str) -> None:
-    passive = enter_passive(mode, 7, name, "why")
-    assert passive == Mode(name, 7, "why")
-    assert passive.passive
-    assert not mode.passive
-    assert passive.speed_factor(7) == 0.0
-
-
-def test_an_emergency_stop_outranks_a_fault_and_the_first_of_each_stays() -> None:
-    fault = enter_passive(Mode(WALK, 0), 1, DAMPING, "fall")
-    assert enter_passive(fault, 2, DAMPING, "qp") is fault
-    stopped = enter_passive(fault, 3, ESTOP, "operator")
-    assert stopped == Mode(ESTOP, 3, "operator")
-    assert enter_passive(stopped, 4, DAMPING, "fall") is stopped
-    assert enter_passive(stopped, 5, ESTOP, "another") is stopped
-
-
-EVENTS = st.lists(
-    st.tuples(
-        st.sampled_from(["step", "stop", DAMPING, ESTOP]), st.integers(0, 600), st.booleans()
-    ),
-    max_size=30,
+@pytest.mark.parametrize(
+    ("before", "after", "code", "detail"),
+    [
+        (Mode(WALK, 3), Mode(STOPPING, 9, "peer-lost:r2"), INPUT_LOST, "stands: peer-lost:r2"),
+        (Mode(WALK, 3), Mode(STOPPING, 9, "stopped:dog"), HALTS, "stands: stopped:dog"),
+        (LOST, Mode(WALK, 9), RESUMED, "walks again after reference-lost"),
+        (Mode(STOPPING, 5, "peer-lost"), LOST, "", ""),
+        (Mode(STAND, 0), Mode(WALK, 9), "", ""),
+        (Mode(STAND, 0), Mode(PASSIVE, 9, "fall"), "", ""),
+    ],
 )
-
-
-@given(EVENTS)
-def test_whatever_happens_passive_is_for_good_and_ranks_only_rise(
-    events: list[tuple[str, int, bool]],
+def test_a_loss_and_a_return_are_announced(
+    before: Mode, after: Mode, code: str, detail: str
 ) -> None:
-    rank = {STAND: 0, WALK: 0, STOPPING: 0, DAMPING: 1, ESTOP: 2}
-    mode, tick = Mode(STAND, 0), 0
-    for kind, passed, boundary in events:
-        tick += passed
-        before = mode
-        if kind == "step":
-            mode = step_mode(mode, tick, STAND_MS, boundary)
-        elif kind == "stop":
-            mode = stop_safely(mode, tick, "why")
-        else:
-            mode = enter_passive(mode, tick, kind, kind)
-        assert rank[mode.name] >= rank[before.name]
-        if before.reason and rank[mode.name] == rank[before.name]:
-            assert mode.reason == before.reason
-            assert mode.name != WALK
+    event = change_event(before, after, 9, "r1")
+    assert (event is None) == (not code)
+    if event is not None:
+        assert (event.code, event.robot, event.kind) == (code, "r1", "fault")
+        assert event.detail.endswith(detail)
 
 
-CAUSES = st.lists(
-    st.builds(Stop, st.sampled_from([STOPPING, DAMPING, ESTOP]), st.sampled_from(["a", "b", "c"])),
-    max_size=5,
+def stood(config: Config) -> Robot:
+    """A robot whose operator was silent from 600 ms on and speaks again from 2 s on."""
+    robot = Robot(config)
+    robot.run(650)
+    robot.references = False
+    assert robot.run(2000).reason == "reference-lost"
+    robot.references = True
+    return robot
+
+
+def modes(robot: Robot, until: int, **first: Any) -> dict[str, int]:
+    """By mode, the first tick at which the robot was in it."""
+    seen = dict[str, int]()
+    while robot.tick < until:
+        tick = robot.tick
+        outputs = robot.step(**first)
+        first = {}
+        seen.setdefault(outputs.mode, tick)
+    return seen
+
+
+def resume(tick: int) -> msg.Resume:
+    return msg.Resume(tick, 0)
+
+
+@pytest.mark.parametrize(("seconds", "begins"), [(0.2, 2300), (1.0, 3100), (2.0, 4100)])
+def test_it_resumes_so_long_after_its_inputs_are_back(seconds: float, begins: int) -> None:
+    # The time is counted from 2.1 s, the next begin of a half cycle: 300 + k · 200.
+    for config, first in ((AUTO, {}), (ALONE, {"resume": resume(2000)})):
+        robot = stood(replace(config, team=replace(config.team, resume_after=seconds)))
+        assert modes(robot, begins + 1, **first) == {STAND: 2000, WALK: begins}
+        assert robot.state.mode == Mode(WALK, begins)
+        assert robot.step().reason == ""
+    assert modes(stood(ALONE), 5000) == {STAND: 2000}, "nobody has asked for it"
+
+
+def test_inputs_that_fail_again_within_that_time_keep_it_standing() -> None:
+    robot = stood(AUTO)
+    robot.run(2401)
+    robot.references = False
+    robot.run(3000)
+    robot.references = True
+    assert modes(robot, 4200) == {STAND: 3000, WALK: 4100}
+
+
+@pytest.mark.parametrize("config", [ALONE, AUTO], ids=["ALONE", "AUTO"])
+def test_who_is_asked_to_stop_stands_until_it_is_asked_to_go_on(config: Config) -> None:
+    robot = Robot(config)
+    robot.run(1000)
+    halts = robot.step(stop=SafeStop(1000, 0, "dog", False))
+    assert (halts.mode, halts.reason) == (STOPPING, "stopped:dog")
+    assert modes(robot, 5000) == {STOPPING: 1001, STAND: 1500}
+    assert modes(robot, 6000, resume=resume(5000)) == {STAND: 5000, WALK: 5100}
+
+
+@pytest.mark.parametrize(
+    ("stop", "asked_at", "asked_anew"),
+    [
+        (2000, 1999, 8000),  # asked before the stop, arrived after it
+        (0, 1999, 8000),  # who presses it does not know the time
+        (1 << 41, 2000, 8001),  # a liar's: none in the future counts
+    ],
 )
-MODES = st.builds(
-    Mode, st.sampled_from([STAND, WALK, STOPPING, DAMPING, ESTOP]), st.just(3), st.just("before")
-) | st.sampled_from([Mode(STAND, 3), Mode(WALK, 3)])
-
-
-@given(MODES, CAUSES)
-def test_stops_of_one_tick_come_to_the_same_as_one_after_the_other(
-    mode: Mode, stops: list[Stop]
+def test_a_request_of_before_a_stop_counts_no_more(
+    stop: int, asked_at: int, asked_anew: int
 ) -> None:
-    one_by_one = mode
-    for stop in stops:
-        if stop.mode == STOPPING:
-            one_by_one = stop_safely(one_by_one, 7, stop.reason)
-        else:
-            one_by_one = enter_passive(one_by_one, 7, stop.mode, stop.reason)
-    assert resolve_stops(mode, 7, stops) == one_by_one
+    robot = stood(ALONE)
+    robot.step(stop=SafeStop(stop, 0, "dog", False))
+    assert robot.state.mode == Mode(STAND, robot.state.mode.since, "stopped:dog")
+    assert modes(robot, 8000, resume=resume(asked_at)) == {STAND: 2001}
+    both = {"stop": SafeStop(8000, 0, "dog", False), "resume": resume(8000)}
+    assert modes(robot, 8001, **both) == {STAND: 8000}, "of both in one tick the stop counts"
+    assert modes(robot, 9200, resume=resume(asked_anew)) == (
+        {STAND: 8001} if asked_anew <= 8000 else {STAND: 8001, WALK: 8100}
+    )
 
 
-def test_of_the_stops_of_one_tick_the_gravest_counts_and_of_equals_the_first() -> None:
-    lost, fall = Stop(STOPPING, "reference-lost"), Stop(DAMPING, "fall")
-    qp, estop = Stop(DAMPING, "qp-failed"), Stop(ESTOP, "estop:operator")
-    walking = Mode(WALK, 1)
-    assert resolve_stops(walking, 7, []) is walking
-    assert resolve_stops(walking, 7, [lost]) == Mode(STOPPING, 7, "reference-lost")
-    assert resolve_stops(walking, 7, [lost, fall, qp]) == Mode(DAMPING, 7, "fall")
-    assert resolve_stops(walking, 7, [lost, fall, estop]) == Mode(ESTOP, 7, "estop:operator")
+@pytest.mark.parametrize("auto", [False, True])
+def test_a_fall_or_an_emergency_stop_meanwhile_is_latched(auto: bool) -> None:
+    lies = [{"state": tilted(tick, 1.2)} for tick in range(2000, 2000 + AGREES_MS + 1)]
+    for stops, mode in ((lies, PASSIVE), ([{"estop": EStop(2000, 0, "dog")}], ESTOP)):
+        robot = stood(AUTO if auto else ALONE)
+        assert [robot.step(**stop).mode for stop in stops][-1] == mode
+        after = 2000 + len(stops)
+        assert modes(robot, 5000, resume=resume(after)) == {mode: after}
+
+
+KEYS = {"team.robots": 3, "planner.kind": "none"}
+RULES = ModeRules(load(None, {**KEYS, "world.mode": "realtime"}), "r1")
+NOW, SINCE = 9000, 300  # tick; when r1 began to walk
+
+
+def status(tick: int, mode: str, reason: str = "") -> Status:
+    return Status(tick, 0, mode, reason, "", {}, {}, np.zeros(0), np.zeros(0))
+
+
+def lost_of(since: int = SINCE, **statuses: Status) -> list[str]:
+    """Why a robot that walks since a tick stops at `NOW`, hearing these of the others."""
+    stops = RULES.stops(Mode(WALK, since), Inputs(standing(NOW)), statuses, reference_age=0)
+    assert {stop.mode for stop in stops} <= {STOPPING}
+    return [stop.reason for stop in stops]
+
+
+@pytest.mark.parametrize(
+    ("said", "lost"),
+    [
+        (status(NOW - SILENCE_MS, WALK), False),
+        (status(NOW - SILENCE_MS - 1, WALK), True),
+        (status(NOW - 90, STAND, "reference-lost"), True),
+        (status(NOW - 90, STOPPING, "peer-lost:r3"), True),
+        (status(NOW - 90, STAND), False),  # all stand before they walk
+        (status(NOW - 90, PASSIVE, "fall"), True),
+        (status(NOW - 90, ESTOP, "estop:dog"), True),
+        (status(NOW - 90, "standing-up", "reset:ann"), True),
+    ],
+)
+def test_whose_status_stops_the_others(said: Status, lost: bool) -> None:
+    assert lost_of(r2=said, r3=status(NOW, WALK)) == (["peer-lost:r2"] if lost else [])
+    assert lost_of(r3=status(NOW, WALK)) == [], "who has not spoken is not missed"
+
+
+def test_robots_that_walk_again_need_not_begin_at_once() -> None:
+    stands, damped = status(NOW, STAND, "peer-lost:r3"), status(NOW, PASSIVE, "fall")
+    assert lost_of(NOW - GRACE_MS, r2=stands) == []
+    assert lost_of(NOW - GRACE_MS - 1, r2=stands) == ["peer-lost:r2"]
+    assert lost_of(NOW - 1, r2=damped) == ["peer-lost:r2"]
+
+
+def test_all_are_ready_once_each_has_said_so() -> None:
+    stands, walks = status(NOW, STAND, "peer-lost:r1"), status(NOW, WALK)
+    assert RULES.peers_ready({"r2": stands, "r3": walks}, NOW)
+    assert not RULES.peers_ready({"r2": stands}, NOW), "r3 has not spoken"
+    assert not RULES.peers_ready({"r2": stands, "r3": walks}, NOW + SILENCE_MS + 1)
+    for other, reason in ((STOPPING, "peer-lost"), (PASSIVE, "fall"), (STAND, "balance-lost")):
+        assert not RULES.peers_ready({"r2": stands, "r3": status(NOW, other, reason)}, NOW)
+    assert ModeRules(load(None, KEYS), "r1").peers_ready({}, NOW), "lock-step hears no statuses"
+
+
+def test_a_robot_stands_up_once_the_others_rest() -> None:
+    since = NOW - 50
+    stands, rises = status(NOW, STAND, "peer-lost:r1"), status(NOW, "standing-up", "reset:ann")
+    assert not RULES.peers_rest({"r2": stands, "r3": status(NOW, WALK)}, NOW, since)
+    assert RULES.peers_rest({"r2": stands, "r3": rises}, NOW, since)
+    assert not RULES.peers_rest({"r2": stands}, NOW, since), "r3 may still speak"
+    assert RULES.peers_rest({"r2": stands}, since + GRACE_MS + 1, since)
+
+
+def pair(**team: Any) -> tuple[Rollout, Callable[[int], dict[str, Outputs]]]:
+    """Two robots that plan with each other, and a function that lets them walk until a tick."""
+    config = replace(CONFIG, team=replace(CONFIG.team, **team))
+    rollout = Rollout(config, simple_predictor(config), every_100_ms)
+
+    def run(until: int) -> dict[str, Outputs]:
+        while rollout.world.tick < until:
+            outputs = rollout.step().outputs
+        return dict(outputs)
+
+    return rollout, run
+
+
+def deaf(agent: Any, begin: int, end: int) -> Any:
+    """An agent that hears nothing of its peers, and loses samples, for some ticks."""
+
+    class Deaf:
+        def step(self, state: Any, inputs: Inputs) -> Any:
+            if begin <= inputs.state.tick < end:
+                inputs = Inputs(inputs.state, references=inputs.references)
+            return agent.step(state, inputs)
+
+    return Deaf()
+
+
+def test_a_pair_that_had_lost_each_other_walks_and_plans_on_together() -> None:
+    rollout, run = pair(auto_resume=True)
+    rollout.agents["r2"] = deaf(rollout.agents["r2"], 1000, 1500)
+    at_rest = run(3500)
+    assert {o.mode for o in at_rest.values()} == {STAND}
+    assert all(o.reason.startswith("peer-lost") for o in at_rest.values())
+    begun = run(3501)  # both at once
+    assert {name: o.mode for name, o in begun.items()} == {"r1": WALK, "r2": WALK}
+    later = run(5000)
+    assert {o.mode for o in later.values()} == {WALK}
+    used = {name: state.planning.planner.newest[0] for name, state in rollout.states.items()}
+    assert set(used.values()) == {4960 // 40}
+    assert not rollout.world.fallen()

@@ -10,10 +10,10 @@ from typing import Any
 import pytest
 
 from quadriga.agents.agent import Agent
-from quadriga.agents.modes import WALK
 from quadriga.agents.planner.compiled_step import CompiledPlan, CompiledStep
 from quadriga.agents.rehearsal import rehearse
 from quadriga.shared.config.sections import Config, TeamConfig
+from quadriga.shared.modes import WALK
 from tests.agents.duet import simple_predictor
 
 ALONE = Config(team=TeamConfig(robots=1))

@@ -68,7 +68,7 @@ class Robot:
             report = self._status.report(state, heat, self._on)
             inputs = SupervisorInputs(now=tick, report=report, report_age=0, request=request)
             self.state, supervised = self._supervisor.step(self.state, inputs)
-            if self.state.mode in (end, BridgeMode.STOPPED):
+            if self.state.mode in (end, BridgeMode.ESTOP):
                 return
             command = self._status.command(supervised.targets)
             self.world.step({} if command is None else {"r1": command})
@@ -81,7 +81,7 @@ class Robot:
             )
 
     def stand(self) -> list[Moment]:
-        return list(self.do(Request.STAND, BridgeMode.STANDING))
+        return list(self.do(Request.STAND, BridgeMode.STAND))
 
 
 def random_angles(kind: str, seed: int) -> Array:
@@ -102,7 +102,7 @@ def try_once(kind: str, seed: int) -> str:
     robot.drop(random_angles(kind, seed))
     if tilt_of(robot.world.physics.qpos[3:7]) > _LYING:
         return TILTED
-    for request, end in ((Request.STAND, BridgeMode.STANDING), (Request.LIE, BridgeMode.PASSIVE)):
+    for request, end in ((Request.STAND, BridgeMode.STAND), (Request.LIE, BridgeMode.PASSIVE)):
         moments = list(robot.do(request, end))
         if robot.state.mode is not end:
             return f"{moments[-1].mode} {robot.state.reason.partition(':')[0]}"

@@ -39,7 +39,7 @@ from tests.bridges.robots import config_of, standing
 from tests.bridges.test_udp_driver import HOST, free_port
 
 KINDS: Final = ("a1", "go1", "go2")
-_BEGINNINGS: Final = (BridgeMode.PASSIVE, BridgeMode.STANDING, BridgeMode.WALKING)
+_BEGINNINGS: Final = (BridgeMode.PASSIVE, BridgeMode.STAND, BridgeMode.WALK)
 _REQUESTS: Final = (*Request, *20 * (Request.WALK,))
 _ANEW: Final = 0.3  # share of steps of a stopped robot after which it is in some other state
 _EXTREMES: Final = np.array(
@@ -192,7 +192,7 @@ class Fuzz:
             AssertionError: a command that left is beyond the limits.
         """
         for now in range(1, packets + 1):
-            if self._state.mode is BridgeMode.STOPPED and self._random.random() < _ANEW:
+            if self._state.mode is BridgeMode.ESTOP and self._random.random() < _ANEW:
                 self._state, self._report = self._begin(now), self._good
             self._turn(now)
 

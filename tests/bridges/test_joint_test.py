@@ -164,7 +164,7 @@ def test_what_is_planted_is_named(fault: str) -> None:
 def test_a_joint_whose_sign_is_turned_stops_the_test_before_it_is_far() -> None:
     """While the motors come on, softly, it leaves the angle at which it shall stay."""
     found = outcome_of(change(turned, "q", "dq", "tau"))
-    assert found.mode is BridgeMode.STOPPED
+    assert found.mode is BridgeMode.ESTOP
     assert found.reason.startswith("tracking-error:FR_thigh_joint -0.4")
     with pytest.raises(CheckError, match="robot r1: test: got 0 joints, expected all 12"):
         refuse_wrong("r1", found.verdicts)
@@ -199,4 +199,4 @@ def test_a_test_that_is_not_wished_any_more_lets_go_and_the_remote_stops_it() ->
     np.testing.assert_array_equal(supervised.targets.kp, 0.0)
     pressed = replace(hanging, remote=pressing("L2", "B"))
     stopped, _ = SUPERVISOR.step(state, replace(inputs, now=2, report=pressed))
-    assert stopped.mode is BridgeMode.STOPPED
+    assert stopped.mode is BridgeMode.ESTOP

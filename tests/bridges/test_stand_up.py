@@ -33,7 +33,7 @@ def test_a_robot_that_stands_does_not_lie_down_to_stand_up() -> None:
 def test_standing_up_that_is_broken_off_goes_down_from_where_it_is() -> None:
     robot = Robot("a1")
     robot.drop(robot.config.robot.q_lying)
-    for moment in robot.do(Request.STAND, BridgeMode.STANDING):
+    for moment in robot.do(Request.STAND, BridgeMode.STAND):
         if moment.height > 0.18:
             break
     down = list(robot.do(Request.LIE, BridgeMode.PASSIVE))

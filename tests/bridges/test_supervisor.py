@@ -66,8 +66,8 @@ def test_up_walk_and_down() -> None:
         assert supervised.targets is not None
     assert named == [
         BridgeMode.STANDING_UP,
-        BridgeMode.STANDING,
-        BridgeMode.WALKING,
+        BridgeMode.STAND,
+        BridgeMode.WALK,
         BridgeMode.LYING_DOWN,
         BridgeMode.RELEASING,
         BridgeMode.PASSIVE,
@@ -82,7 +82,7 @@ def test_a_passive_robot_has_its_motors_off() -> None:
 
 
 def test_walking_passes_the_agents_command_on() -> None:
-    _, supervised = step(in_mode(BridgeMode.WALKING), at(request=Request.WALK, command_age=3))
+    _, supervised = step(in_mode(BridgeMode.WALK), at(request=Request.WALK, command_age=3))
     targets = supervised.targets
     assert targets is not None
     np.testing.assert_allclose(targets.tau, COMMAND.tau)
@@ -91,7 +91,7 @@ def test_walking_passes_the_agents_command_on() -> None:
 
 
 def test_a_late_agent_is_waited_for_with_the_joints_held_then_the_robot_stops() -> None:
-    state = in_mode(BridgeMode.WALKING)
+    state = in_mode(BridgeMode.WALK)
     hold, damp = CONFIG.bridge.hold_ms, CONFIG.bridge.damp_ms
     first = standing(CONFIG, q=ROBOT.q_stand + 0.1)
     state, held = step(state, at(request=Request.WALK, report=first, command_age=hold + 1))
@@ -101,9 +101,9 @@ def test_a_late_agent_is_waited_for_with_the_joints_held_then_the_robot_stops() 
     assert held.targets is not None
     np.testing.assert_allclose(held.targets.q, first.q)
     fresh, _ = step(state, at(103, request=Request.WALK, command_age=0))
-    assert (fresh.mode, fresh.held) == (BridgeMode.WALKING, None)
+    assert (fresh.mode, fresh.held) == (BridgeMode.WALK, None)
     stopped, supervised = step(state, at(103, request=Request.WALK, command_age=damp + 1))
-    assert (stopped.mode, stopped.reason) == (BridgeMode.STOPPED, f"command-late:{damp + 1} ms")
+    assert (stopped.mode, stopped.reason) == (BridgeMode.ESTOP, f"command-late:{damp + 1} ms")
     assert supervised.targets is not None
     np.testing.assert_array_equal(supervised.targets.kp, 0.0)
     assert (supervised.targets.kd > 0.0).all()
@@ -120,16 +120,16 @@ SICK = {
 }
 
 
-@pytest.mark.parametrize("mode", [BridgeMode.STANDING, BridgeMode.WALKING])
+@pytest.mark.parametrize("mode", [BridgeMode.STAND, BridgeMode.WALK])
 @pytest.mark.parametrize("reason", list(SICK))
 def test_a_sick_robot_stops_for_good(mode: BridgeMode, reason: str) -> None:
     state, supervised = step(in_mode(mode), at(request=Request.WALK, report=SICK[reason]))
-    assert state.mode is BridgeMode.STOPPED
+    assert state.mode is BridgeMode.ESTOP
     assert state.reason.partition(":")[0] == reason
-    assert supervised.changes == ((BridgeMode.STOPPED, state.reason),)
+    assert supervised.changes == ((BridgeMode.ESTOP, state.reason),)
     for request in Request:  # nothing brings it back
         again, _ = step(state, at(101, request=request))
-        assert again.mode is BridgeMode.STOPPED
+        assert again.mode is BridgeMode.ESTOP
 
 
 @pytest.mark.parametrize(
@@ -145,7 +145,7 @@ def test_a_hot_motor_is_warned_of_before_it_stops_the_robot(
     def at_heat(degrees: float) -> tuple[str, str]:
         heat = np.where(np.arange(12) == 5, degrees, 40.0)
         inputs = at(report=standing(config, temperature=heat))
-        state, _ = supervisor.step(in_mode(BridgeMode.STANDING), inputs)
+        state, _ = supervisor.step(in_mode(BridgeMode.STAND), inputs)
         return supervisor.warning(inputs.report)[:17], state.reason
 
     assert at_heat(warm - 1.0) == ("", "")
@@ -158,22 +158,22 @@ def test_a_joint_that_stays_too_fast_stops_the_robot(period: int, joint: int, si
     """A swing leg may pass the limit for a moment; a joint that runs away may not."""
     dq = np.zeros(12)
     dq[joint] = sign * 1.01 * CONFIG.bridge.speed_share * ROBOT.speed[joint % 3]
-    fast, state = standing(CONFIG, dq=dq), in_mode(BridgeMode.WALKING, sent=100)
+    fast, state = standing(CONFIG, dq=dq), in_mode(BridgeMode.WALK, sent=100)
     for now in range(100 + period, 100 + CONFIG.bridge.speed_ms + 1, period):
         state, _ = step(state, at(now, request=Request.WALK, report=fast))
-        assert state.mode is BridgeMode.WALKING
+        assert state.mode is BridgeMode.WALK
     calm, _ = step(state, at(now + 1, request=Request.WALK))
-    assert (calm.mode, calm.fast_ms) == (BridgeMode.WALKING, 0)
+    assert (calm.mode, calm.fast_ms) == (BridgeMode.WALK, 0)
     state, _ = step(state, at(now + period, request=Request.WALK, report=fast))
-    assert state.mode is BridgeMode.STOPPED
+    assert state.mode is BridgeMode.ESTOP
     assert state.reason.startswith(f"speed:{JOINT_NAMES[joint]} ")
 
 
 @pytest.mark.parametrize("mode", [m for m in BridgeMode if m is not BridgeMode.DRY])
 def test_an_emergency_stop_of_the_team_stops_a_robot_in_every_state(mode: BridgeMode) -> None:
     state, _ = step(in_mode(mode), at(estop="dog on the track"))
-    assert state.mode is BridgeMode.STOPPED
-    assert mode is BridgeMode.STOPPED or state.reason == "estop:dog on the track"
+    assert state.mode is BridgeMode.ESTOP
+    assert mode is BridgeMode.ESTOP or state.reason == "estop:dog on the track"
 
 
 @pytest.mark.parametrize(
@@ -186,12 +186,12 @@ def test_an_emergency_stop_of_the_team_stops_a_robot_in_every_state(mode: Bridge
     ],
 )
 def test_a_lost_robot_or_another_writer_stops_it(fields: dict[str, Any], reason: str) -> None:
-    state, _ = step(in_mode(BridgeMode.STANDING), at(**fields))
+    state, _ = step(in_mode(BridgeMode.STAND), at(**fields))
     assert state.reason.partition(":")[0] == reason
 
 
 def test_a_stopped_robot_is_damped_and_then_passive() -> None:
-    state = in_mode(BridgeMode.STOPPED, since=0)
+    state = in_mode(BridgeMode.ESTOP, since=0)
     end = round(1000 * CONFIG.bridge.passive_s)
     _, damped = step(state, at(end))
     _, passive = step(state, at(end + 1))
@@ -203,16 +203,16 @@ def test_a_stopped_robot_is_damped_and_then_passive() -> None:
 
 def test_the_stop_buttons_hold_a_passive_robot_down_too() -> None:
     inputs = at(request=Request.STAND, report=standing(CONFIG, remote=pressing("L2", "B")))
-    assert step(in_mode(BridgeMode.PASSIVE), inputs)[0].mode is BridgeMode.STOPPED
+    assert step(in_mode(BridgeMode.PASSIVE), inputs)[0].mode is BridgeMode.ESTOP
     one = at(request=Request.STAND, report=standing(CONFIG, remote=pressing("B")))
     assert step(in_mode(BridgeMode.PASSIVE), one)[0].mode is BridgeMode.STANDING_UP
 
 
 def test_nobody_walks_before_the_agent_has_spoken() -> None:
-    standing_still = in_mode(BridgeMode.STANDING)
+    standing_still = in_mode(BridgeMode.STAND)
     for fields in ({"command": None}, {"command_age": 21}):
         state, _ = step(standing_still, at(request=Request.WALK, **fields))
-        assert state.mode is BridgeMode.STANDING
+        assert state.mode is BridgeMode.STAND
 
 
 @given(st.floats(-3.1, 3.1))

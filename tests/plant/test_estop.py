@@ -7,10 +7,10 @@ from typing import cast
 import numpy as np
 import pytest
 
-from quadriga.plant.late import MOTOR_DAMPING
+from quadriga.plant.commands import MOTOR_DAMPING
+from quadriga.plant.requests import NO_REQUESTS, Requests
 from quadriga.plant.server import STOP_LINGER_MS, PlantServer
 from quadriga.plant.team_time import FollowerTime
-from quadriga.plant.words import NO_WORDS, Words
 from quadriga.shared import codes
 from quadriga.shared.bus.session import Bus
 from quadriga.shared.config.sections import Config
@@ -20,17 +20,17 @@ from tests.plant.test_server import Listener, served
 from tests.sim_server.standing import STAND
 
 
-def say(server: PlantServer, *words: Words) -> None:
-    """Have people say something at each of the next ticks, and nothing after."""
-    said = iter(words)
-    server.words = lambda: next(said, NO_WORDS)
+def ask(server: PlantServer, *requests: Requests) -> None:
+    """Have people ask for something at each of the next ticks, and nothing after."""
+    asked = iter(requests)
+    server.requests = lambda: next(asked, NO_REQUESTS)
 
 
 def test_whatever_agents_command_after_it_the_joints_are_damped() -> None:
     server, listener = served(initial_posture="standing")
     for _ in range(50):
         server.step({"r1": STAND})
-    say(server, Words("operator: dog"))
+    ask(server, Requests("operator: dog"))
     for _ in range(100):
         before = server.plant.states()["r1"]
         server.step({"r1": STAND})
@@ -41,22 +41,11 @@ def test_whatever_agents_command_after_it_the_joints_are_damped() -> None:
     assert stops[0].detail.startswith("operator: dog")
 
 
-@pytest.mark.parametrize("pressed", [False, True])
-def test_nobody_is_led_down_slowly_after_it(pressed: bool) -> None:
-    server, listener = served()
-    server.words = lambda: Words("now") if pressed else NO_WORDS
-    for _ in range(10):
-        server.step({})
-    told = {event.code for event in listener.events()}
-    assert (codes.LOWERED in told) is not pressed
-    assert (codes.ESTOPPED in told) is pressed
-
-
 def test_a_world_of_one_robot_among_several_names_it() -> None:
     config, listener = Config(), Listener()
     world = World(config, ("r2",))
     server = PlantServer(config, world, cast("Bus", listener), FollowerTime(config))
-    server.words = lambda: Words("now")
+    server.requests = lambda: Requests("now")
     server.step({"r2": STAND})
     assert [e.robot for e in listener.events() if e.code == codes.ESTOPPED] == ["r2"]
 
@@ -67,8 +56,8 @@ RELEASE = Reset(0, 0, "ann")
 def test_only_its_release_ends_it_and_not_one_of_the_same_tick() -> None:
     server, listener = served(initial_posture="standing")
     torques = []
-    later = Words(reset=Reset(2, 0, "ann"))
-    say(server, Words("dog", reset=RELEASE), NO_WORDS, later)
+    later = Requests(reset=Reset(2, 0, "ann"))
+    ask(server, Requests("dog", reset=RELEASE), NO_REQUESTS, later)
     for _ in range(4):
         v_joint = server.plant.states()["r1"].v_joint
         server.step({"r1": STAND})
@@ -81,8 +70,15 @@ def test_only_its_release_ends_it_and_not_one_of_the_same_tick() -> None:
 
 def test_a_release_that_comes_twice_ends_no_stop_that_was_pressed_meanwhile() -> None:
     server, listener = served(initial_posture="standing")
-    release = Words(reset=RELEASE)
-    say(server, Words("dog"), release, Words("cat"), release, Words(reset=Reset(9, 0, "bob")))
+    release = Requests(reset=RELEASE)
+    ask(
+        server,
+        Requests("dog"),
+        release,
+        Requests("cat"),
+        release,
+        Requests(reset=Reset(9, 0, "bob")),
+    )
     for _ in range(5):
         server.step({"r1": STAND})
     told = [(e.tick, e.code) for e in listener.events() if e.kind == "fault"]
@@ -91,7 +87,13 @@ def test_a_release_that_comes_twice_ends_no_stop_that_was_pressed_meanwhile() ->
 
 def test_a_release_that_was_said_before_a_stop_does_not_end_it() -> None:
     server, listener = served(initial_posture="standing")
-    say(server, NO_WORDS, Words("dog"), Words(reset=RELEASE), Words(reset=Reset(1, 0, "ann")))
+    ask(
+        server,
+        NO_REQUESTS,
+        Requests("dog"),
+        Requests(reset=RELEASE),
+        Requests(reset=Reset(1, 0, "ann")),
+    )
     for _ in range(4):
         server.step({"r1": STAND})
     told = [(e.tick, e.code) for e in listener.events() if e.kind == "fault"]
@@ -100,7 +102,7 @@ def test_a_release_that_was_said_before_a_stop_does_not_end_it() -> None:
 
 def test_whoever_presses_it_again_gets_an_answer_though_not_with_every_tick() -> None:
     server, listener = served(initial_posture="standing")
-    server.words = lambda: Words("dog")
+    server.requests = lambda: Requests("dog")
     for _ in range(250):
         server.step({"r1": STAND})
     stops = [event.tick for event in listener.events() if event.code == codes.ESTOPPED]
@@ -108,14 +110,14 @@ def test_whoever_presses_it_again_gets_an_answer_though_not_with_every_tick() ->
 
 
 def test_a_stopped_robot_sinks_and_that_is_no_fall_but_one_after_its_release_is() -> None:
-    server, listener = served(initial_posture="standing", seconds=60.0)
-    say(server, Words("dog"))
+    server, listener = served(initial_posture="standing", duration=60.0)
+    ask(server, Requests("dog"))
     for _ in range(2000):
         assert server.step({"r1": STAND}) is None
     told = [event.code for event in listener.events() if event.kind == "fault"]
     assert told == [codes.ESTOPPED, codes.LIES]
     assert server.plant.truth().base_pos[0, 2] < 0.15  # type: ignore[union-attr]
-    say(server, Words(reset=Reset(server.plant.tick, 0, "ann")))
+    ask(server, Requests(reset=Reset(server.plant.tick, 0, "ann")))
     up = 0.0
     while up < 0.27 and server.plant.tick < 6000:
         assert server.step({"r1": STAND}) is None
@@ -129,7 +131,7 @@ def test_a_stopped_robot_sinks_and_that_is_no_fall_but_one_after_its_release_is(
 @pytest.mark.parametrize("ends", [False, True])
 def test_a_walk_that_is_to_be_over_is_once_the_team_has_had_time_to_stand(ends: bool) -> None:
     server, listener = served(initial_posture="standing")
-    say(server, NO_WORDS, Words(stop=SafeStop(0, 0, "lunch", ends)))
+    ask(server, NO_REQUESTS, Requests(stop=SafeStop(0, 0, "lunch", ends)))
     over = [server.step({"r1": STAND}) for _ in range(STOP_LINGER_MS + 2)]
     asked = [(e.tick, e.detail) for e in listener.events() if e.code == codes.STOP_ASKED]
     assert asked == [(1, "lunch; the walk ends" if ends else "lunch")]
@@ -142,6 +144,6 @@ def test_only_who_drives_time_ends_a_walk() -> None:
     server = PlantServer(
         config, World(config, ("r2",)), cast("Bus", listener), FollowerTime(config)
     )
-    say(server, Words(stop=SafeStop(0, 0, "lunch", True)))
+    ask(server, Requests(stop=SafeStop(0, 0, "lunch", True)))
     assert [server.step({"r2": STAND}) for _ in range(STOP_LINGER_MS + 9)][-1] is None
     assert not listener.events()

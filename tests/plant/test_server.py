@@ -67,7 +67,7 @@ def test_a_malformed_command_is_reported_in_few_words(body: dict[str, object]) -
 
 def test_a_detail_is_cut_to_what_an_event_may_hold() -> None:
     server, listener = served()
-    server.announce(codes.SILENT, "r1", "x" * (MAX_TEXT + 1))
+    server.announce(codes.MALFORMED, "r1", "x" * (MAX_TEXT + 1))
     assert listener.events()[0].detail == "x" * (MAX_TEXT - 1) + "…"
 
 
@@ -75,7 +75,7 @@ def test_a_detail_is_cut_to_what_an_event_may_hold() -> None:
 def test_in_real_time_nothing_waits_for_who_does_not_listen(mode: str) -> None:
     server, listener = served(mode=mode)
     server.publish()
-    for code in (codes.PUSH, codes.BACK, codes.FALL, codes.SIGNAL):
+    for code in (codes.PUSH, codes.RESET, codes.FALL, codes.SIGNAL):
         server.announce(code, "", "")
     keys = {STATE.key("team", "r1"), TRUTH.key("team"), CLOCK.key("team"), EVENT.key("team")}
     assert {key for key, _, _ in listener.packets} >= keys
@@ -122,7 +122,7 @@ class BlindPlant(Plant):
     ids=["stands", "falls", "stopped"],
 )
 def test_any_plant_is_served(down: str, last: int) -> None:
-    config, listener = configured(seconds=2.0), Listener()
+    config, listener = configured(duration=2.0), Listener()
     server = PlantServer(config, BlindPlant(down), cast("Bus", listener))
     end = None
     while end is None:

@@ -54,15 +54,13 @@ def test_who_drives_time_waits_for_every_state_and_command_of_the_tick(config: C
     assert time.awaited(1) == {"plant_r2", "plant_r3"}
 
 
-def test_it_waits_for_the_plant_of_a_silent_robot_but_not_for_its_commands(config: Config) -> None:
+def test_the_walk_ends_when_another_plant_has_lost_its_robots_commands(config: Config) -> None:
     time = LeadTime(config, "r1")
-    for robot in ("r2", "r3"):
-        time.take(STATE.key("team", robot), state(7), 7)
-    time.take(COMMAND.key("team", "r3"), command(7), 7)
-    for code, awaited in ((codes.GONE, set()), (codes.BACK, {"plant_r2"}), (codes.SILENT, set())):
-        time.take(EVENT.key("team"), event(code, "r2"), 7)
-        assert time.awaited(7) == awaited
-    assert time.awaited(8) == {"plant_r2", "plant_r3"}
+    time.take(EVENT.key("team"), event(codes.COMMAND_LOST, "stranger"), 7)
+    assert time.end is None
+    time.take(EVENT.key("team"), event(codes.COMMAND_LOST, "r2"), 7)
+    assert time.end is not None
+    assert time.end.code == codes.COMMAND_LOST
 
 
 @pytest.mark.parametrize("forged", [b"", b"\xc1", state(900), command(900)])

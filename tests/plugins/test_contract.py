@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 
 from quadriga.agents.gait import nominal_forces
-from quadriga.agents.modes import STAND, WALK, Mode
 from quadriga.agents.planning.active_plan import ActivePlan, setpoint_at
 from quadriga.agents.planning.interface import (
     Expected,
@@ -33,6 +32,7 @@ from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import PLANNER
 from quadriga.shared.messages import Plan
+from quadriga.shared.modes import STAND, WALK, Mode
 from quadriga.shared.planner_kinds import find_kind, installed_kinds
 from quadriga.shared.robots.conventions import Array, robot_names
 from quadriga.team.operator import references_of

@@ -10,11 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from quadriga.recordings.metadata import build_metadata
-from quadriga.shared import codes
 from quadriga.shared.codec import encode
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
-from quadriga.shared.messages import Command, Event
+from quadriga.shared.messages import Command
 from quadriga.shared.recording.writer import RecordingWriter
 from quadriga.sim_server.world.world import World
 from tests.a1 import q_stand
@@ -22,12 +21,9 @@ from tests.a1 import q_stand
 Packet = tuple[str, bytes]
 Change = Callable[[int, str, bytes], bytes | None]
 TICKS = 300
-SILENT = range(120, 180)  # ticks without r2's command; the world gave up on it
-LATE = range(120, 140)  # of these, ticks for which its command was sent too late
 SCENE = {
     "team.robots": 2, "world.terrain": "boxes", "world.terrain_height": 0.03, "world.seed": 5,
     "world.payload": 3.0, "world.push": "r1:60:90:0.1:0.05", "world.duration": 0.5,
-    "world.lost_command": "damp",
 }  # fmt: skip
 
 
@@ -59,19 +55,12 @@ def packets(config: Config) -> Iterator[tuple[int, str, bytes]]:
             yield tick, f"team/{name}/state", encode(state)
         commands = {name: command(tick, i) for i, name in enumerate(world.names)}
         for name, sent in commands.items():
-            if name != "r2" or tick not in SILENT or tick in LATE:
-                yield tick, f"team/{name}/command", encode(sent)
+            yield tick, f"team/{name}/command", encode(sent)
         if tick % 50 == 20:  # refused by the world: of the future, of the past, and a foreign one's
             for forged in (tick + 20, tick - 20):
                 yield tick, "team/r1/command", encode(replace(command(forged, 0), kp=np.ones(12)))
             for key in ("team/r7/state", "team/r2/state"):
                 yield tick, key, encode(world.states()["r1"])
-        if tick in (SILENT.start, SILENT.stop):
-            code = codes.BACK if tick == SILENT.stop else codes.SILENT
-            fault = Event(tick, 10**6 * tick, "fault", "r2", "in any words", code)
-            yield tick, "team/sim/event", encode(fault)
-        if tick in SILENT:
-            del commands["r2"]
         for event in world.step(commands):
             yield tick, "team/sim/event", encode(event)
 

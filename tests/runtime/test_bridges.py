@@ -106,7 +106,7 @@ def test_a_robot_stands_up_walks_and_lies_down_through_its_own_protocol(
     out = tmp_path / "run"
     done = walk(file, out, "--armed")
     said = (out / "logs" / "plant_r1.log").read_text(encoding="utf-8")
-    ways = ["r1: standing-up", "r1: standing", "r1: walking"]
+    ways = ["r1: standing-up", "r1: stand", "r1: walk"]
     # Where a busy machine gives it too little time it stops, with a reason: a good end, too.
     stopped = "r1: stopped " in said or "r1 stopped" in done.stdout
     ways += [] if "r1: stopped " in said else ["r1: lying-down", "r1: releasing", "r1: passive"]
@@ -114,7 +114,7 @@ def test_a_robot_stands_up_walks_and_lies_down_through_its_own_protocol(
     assert stopped or done.returncode == 0, done.stdout + done.stderr
     recording = Recording(out / "run.mcap")
     told = [mode.partition(",")[0] for mode in modes_of(recording)]
-    assert told == ["standing-up", "standing", "walking"]
+    assert told == ["standing-up", "stand", "walk"]
     if not stopped:
         assert max(m.y[1] for m in recording.messages(Measurement, "r1")) > 0.3, "it walks"
     assert replay_all(out) == ""

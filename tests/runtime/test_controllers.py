@@ -11,7 +11,7 @@ from quadriga.recordings.check import check, format_findings
 from quadriga.recordings.summary import summary_of
 from quadriga.recordings.traces import read_traces
 from quadriga.replay.team_replay import replay
-from quadriga.shared.errors import RecordingError
+from quadriga.shared.errors import ProcessError, RecordingError
 from quadriga.shared.runtime.places import SOURCE
 from tests.runtime.conftest import Make, Team
 
@@ -64,25 +64,27 @@ def test_a_program_without_quadriga_is_one_of_the_team(make_team: Make) -> None:
     assert_checked(team)
 
 
-def test_who_fails_is_named_and_the_world_goes_on(make_team: Make) -> None:
-    ways = "r1=nan r2=ticks r3=silent r4=slow"
+@pytest.mark.parametrize(
+    ("ways", "said"),
+    [
+        ("r1=slow r2=nan", r"r2 silent for 0.5 s, .* refused \(command\.tau: got NaN or infinity"),
+        ("r1=slow r2=ticks", r"r2 silent .* \(command\.tick: got 1100, expected 100\)"),
+        ("r1=slow r2=silent", r"r2 silent for 0.5 s$"),
+    ],
+)
+def test_who_fails_is_named_and_the_walk_ends(make_team: Make, ways: str, said: str) -> None:
     team = make_team(
-        team__robots=4,
+        team__robots=2,
         team__yokes="none",
         team__agent_command=f"python {FAULTY} {ways}",
-        world__duration=0.5,
+        world__duration=60.0,
         world__command_timeout=0.5,
         recorder__enabled=True,
     )
-    recording = team.run(standing=False)
-    said = team.log("sim")
-    refused = "silent for 0.5 s, its last command was refused"
-    assert f"silent r1 {refused} (command.tau: got NaN or infinity, expected finite" in said
-    assert re.search(r"malformed r1 \d+ commands dropped: command\.tau: got NaN", said)
-    assert re.search(rf"silent r2 {refused} \(command\.tick: got 1100, expected 100\)", said)
-    assert "silent r3 silent for 0.5 s: the world goes on without its commands" in said
-    assert not re.search(r"(silent|gone|malformed) r4", said), "it is only slow"
-    stops = summary_of(read_traces(recording))["stop_reasons"]
-    assert {robot: reason.partition(":")[0] for robot, reason in stops.items()} == dict.fromkeys(
-        ("r1", "r2", "r3"), "silent"
-    )
+    with team.launch(standing=False) as running, pytest.raises(ProcessError, match="process sim"):
+        running.watch(lambda: False)
+    assert re.search(rf"100 ms: command-lost  {said}", team.log("sim"), re.MULTILINE)
+    stops = summary_of(read_traces(team.recording()))["stop_reasons"]
+    assert {robot: reason.partition(":")[0] for robot, reason in stops.items()} == {
+        "r2": "command-lost"
+    }

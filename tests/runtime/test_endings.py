@@ -21,8 +21,8 @@ from quadriga.shared.recording.metadata import END
 from quadriga.shared.topics import TRUTH
 from quadriga.team.launch import Launch
 from quadriga.team.run_report import report_folder
+from tests.runtime.awaiting import await_tick
 from tests.runtime.conftest import WAIT, Make, Team
-from tests.runtime.frozen import await_tick
 from tests.runtime.test_router import await_routing, router
 
 pytestmark = pytest.mark.usefixtures("_compiled")

@@ -19,8 +19,8 @@ from quadriga.shared.messages import Clock, EStop, Event, Status
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.topics import CLOCK, COMMAND, EVENT
 from quadriga.team import launch
+from tests.runtime.awaiting import TEAM, await_tick
 from tests.runtime.conftest import BEGUN, WAIT, Make, run_alone
-from tests.runtime.frozen import PATIENCE, TEAM, await_tick, freeze
 
 FOREVER = 600.0  # s of world time
 Watcher = Callable[..., Bus]
@@ -30,28 +30,18 @@ def never() -> bool:
     return False
 
 
-def test_a_frozen_robot_is_named_and_the_world_goes_on_until_it_returns(
-    make_team: Make, watcher: Watcher
-) -> None:
-    team = make_team(world__duration=FOREVER, world__command_timeout=PATIENCE)
-    with team.launch() as running:
-        team.await_log("sim", BEGUN)
-        freeze(running, watcher(team), "r2", tick=100, ticks=100)
-        team.await_log("sim", f"silent r2 silent for {PATIENCE:g} s: the world goes on")
-        team.await_log("sim", "back r2 answers again")
-        running.watch(lambda: True)
-
-
-def test_who_is_frozen_to_the_end_is_named_and_nobody_else(make_team: Make) -> None:
-    team = make_team(world__duration=1.0, world__command_timeout=0.5)
+@pytest.mark.parametrize("mode", ["lockstep", "realtime"])
+def test_a_frozen_robot_is_named_and_the_walk_ends(make_team: Make, mode: str) -> None:
+    team = make_team(world__mode=mode, world__duration=FOREVER, world__command_timeout=0.5)
     rows = [replace(row, grace=1.0 if row.name == "r2" else row.grace) for row in team.rows()]
     with launch.Launch(rows, team.folder / "logs") as running:
         team.await_log("sim", BEGUN)
         os.kill(running.pids["r2"], signal.SIGSTOP)
-        with pytest.raises(ProcessError, match="process r2: got no end after the walk"):
+        with pytest.raises(ProcessError, match="r2 silent for"):
             running.watch(never)
-    last = team.log("sim").splitlines()[-1]
-    assert "time-over  end of world.duration" in last, "and then nothing, no traceback"
+    ends = [line for line in team.log("sim").splitlines() if "command-lost" in line]
+    assert len(ends) == 1
+    assert "command-lost  r2 silent for" in ends[0]
 
 
 def test_in_real_time_the_world_waits_for_no_frozen_listener(
@@ -91,7 +81,7 @@ def test_kill_9_of_one_stops_the_walk_and_names_it(make_team: Make, name: str) -
         team.await_log("sim", BEGUN)
         os.kill(pids[name], signal.SIGKILL)
         if name == "r2":  # the world notices by itself, if the launcher does not stop it before
-            team.await_log("sim", "gone r2 gone")
+            team.await_log("sim", "command-lost  r2 gone")
         with pytest.raises(ProcessError, match=f"process {name}: got signal 9"):
             running.watch(never)
     assert not [pid for pid in pids.values() if os.path.exists(f"/proc/{pid}")]

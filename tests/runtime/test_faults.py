@@ -60,10 +60,10 @@ def test_a_killed_agent_and_a_dead_knee(tmp_path: Path) -> None:
         assert row["tick"] >= 1500
         assert not {"error"} & row.keys(), row
     # Where a computer is too slow for a team, the plant leads others down, too: they are late.
-    others = set(killed["lowered"]) - {killed["robot"]}
-    assert killed["robot"] in killed["lowered"]
+    others = set(killed["lost"]) - {killed["robot"]}
+    assert killed["robot"] in killed["lost"]
     assert others <= who_is_late(folder / f"agent-killed-{EARLY}")
-    assert killed["falls"] == knee["lowered"] == []
+    assert killed["falls"] == knee["lost"] == []
     assert 0 <= killed["detect_ms"] < 1000
     assert killed["recover_ms"] is None
     told = injected(folder / f"agent-killed-{EARLY}")

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import shutil
-import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -25,19 +23,16 @@ from quadriga.replay.outcome import ReplayOutcome
 from quadriga.replay.recorded_predictor import copy_predictor
 from quadriga.replay.saved_qp import load as load_qp
 from quadriga.replay.team_replay import replay
-from quadriga.shared.bus.session import Bus
-from quadriga.shared.codes import BACK
 from quadriga.shared.config.load import load
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.errors import ConfigError, RecordingError
-from quadriga.shared.messages import Command, Consumed, Measurement, Message, Plan, State, Status
+from quadriga.shared.messages import Command, Consumed, Measurement, Message, Plan, State
 from quadriga.shared.recording.reader import Recording
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import Launch, process_table
 from quadriga.what_if.what_if import Branch, WhatIf, answer_what_if
 from tests.quadriga.replay.rewritten import planted_bit, rewritten, without
 from tests.runtime.conftest import DATA, REAL_TIME, SPEED, WAIT
-from tests.runtime.frozen import PATIENCE, await_event, await_tick, freeze
 
 pytestmark = pytest.mark.usefixtures("_compiled")
 
@@ -317,36 +312,6 @@ def test_what_was_taken_in_in_real_time_cannot_be_guessed(tmp_path: Path) -> Non
     count = after.number - before.number - 1
     assert tick == before.tick + 1
     assert name == f"{count} of inputs of r1 between ticks {before.tick} and {after.tick}"
-
-
-def frozen_for_a_while(running: Launch, endpoint: str) -> None:
-    """Freeze r1 in mid-walk until the others have gone on without it; end when it is back."""
-    config = load(None, {"bus.endpoint": endpoint})
-    bus = Bus.open(config.bus, "team", "watcher")
-    bus.subscribe("team/**")
-    try:
-        freeze(running, bus, "r1", tick=500, ticks=300)
-        await_tick(bus, await_event(bus, "r1", BACK) + 200)
-        os.kill(running.pids["sim"], signal.SIGTERM)
-    finally:
-        bus.close()
-
-
-def test_waits_that_were_given_up_are_replayed_to_the_byte(tmp_path: Path) -> None:
-    run = walked(
-        tmp_path / "run",
-        frozen_for_a_while,
-        world__duration=600.0,
-        world__command_timeout=PATIENCE,
-        planner__peer_timeout=0.1,
-    )
-    recording = Recording(run)
-    records = {robot: list(recording.messages(Consumed, robot)) for robot in ("r1", "r2")}
-    assert any("plan/r1" in record.owed for record in records["r2"])
-    assert sum(record.passed for record in records["r1"]) > 50
-    last = list(recording.messages(Status, "r2"))[-1]
-    assert last.counters["waits_given_up"] >= 1
-    check_exact(run, replayed(run))
 
 
 @pytest.mark.parametrize("kind", ["centralised"])

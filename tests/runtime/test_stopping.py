@@ -16,16 +16,16 @@ from quadriga.shared.codes import (
     LIES,
     RESET,
     RESUMED,
-    RISES,
     STANDS_AGAIN,
+    STANDS_UP,
     STOP_ASKED,
     STOPPED,
 )
 from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.topics import TRUTH
+from tests.runtime.awaiting import await_tick
 from tests.runtime.conftest import WAIT, Make
-from tests.runtime.frozen import await_tick
 
 pytestmark = pytest.mark.usefixtures("_compiled")
 
@@ -64,7 +64,7 @@ def test_stopped_released_and_sent_on(
     traces = read_traces(team.recording())
     told = [event.code for event in traces.events]
     assert FALL not in told
-    for code in (ESTOPPED, LIES, RESET, RISES, STANDS_AGAIN, RESUMED, STOP_ASKED, HALTS):
+    for code in (ESTOPPED, LIES, RESET, STANDS_UP, STANDS_AGAIN, RESUMED, STOP_ASKED, HALTS):
         assert code in told, code
     assert (told[-1], traces.events[-1].detail.partition(";")[0]) == (STOPPED, "night")
     path = str(team.folder / "run.mcap")

@@ -17,7 +17,7 @@ def test_every_code_has_a_kind_and_a_meaning() -> None:
 
 
 def test_an_event_keeps_its_code_on_the_wire() -> None:
-    event = Event(5, 5_000_000, "fault", "r1", "in any words", codes.BACK)
+    event = Event(5, 5_000_000, "fault", "r1", "in any words", codes.RESET)
     assert decode(encode(event), Event) == event
 
 

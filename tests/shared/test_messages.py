@@ -21,8 +21,8 @@ def test_a_log_gives_back_the_events_that_were_written_into_it(
 
 
 def test_a_line_tells_what_happened_and_to_whom() -> None:
-    event = Event.of(3777, codes.LOWERED, "r1", "no command: its joints are led down")
-    assert format_event(event) == "3777 ms: lowered r1 no command: its joints are led down"
+    event = Event.of(3777, codes.LIES, "r1", "height 0.1 m")
+    assert format_event(event) == "3777 ms: lies r1 height 0.1 m"
 
 
 def test_lines_that_are_no_events_are_left_out() -> None:

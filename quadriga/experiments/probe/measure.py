@@ -10,12 +10,12 @@ from functools import partial
 
 import numpy as np
 
-from quadriga.agents.modes import DAMPING
 from quadriga.experiments.probe.branch import run_branch
 from quadriga.experiments.probe.pulses import DIRECTIONS, PULSE_MS, pulse_forces, pulse_starts
 from quadriga.experiments.probe.responses import Repetition
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.config.sections import Config
+from quadriga.shared.modes import PASSIVE
 from quadriga.shared.robots.conventions import N_FORCES, N_OUTPUTS, Array, robot_names
 from quadriga.shared.topics import SAMPLE_MS
 from quadriga.team.operator import references_of
@@ -52,7 +52,7 @@ class PulsedWalk:
         """Walk until the world is at `tick`; not farther than to the first fall."""
         while self._down_from is None and self._rollout.world.tick < tick:
             now = self._rollout.step()
-            gave_up = any(out.mode == DAMPING for out in now.outputs.values())
+            gave_up = any(out.mode == PASSIVE for out in now.outputs.values())
             if gave_up or self._rollout.world.fallen():
                 self._down_from = now.tick
             measured = [now.outputs[name].measurement for name in self._names]

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final, NamedTuple
 
-from quadriga.agents.modes import RISING, WALK
 from quadriga.recordings.checks.finding import CheckedMessage, Finding
 from quadriga.shared.messages import Status
+from quadriga.shared.modes import STANDING_UP, WALK
 from quadriga.shared.topics import PLAN
 
 _MOST: Final = 100_000  # doubts that are kept; beyond that there is something else amiss
@@ -29,7 +29,7 @@ class GettingUp:
         if not isinstance(item.message, Status):
             return
         tick, robot, mode = item.message.tick, item.robot, item.message.mode
-        self._up.note(robot, tick, holds=mode == RISING)
+        self._up.note(robot, tick, holds=mode == STANDING_UP)
         self._rest.note(robot, tick, holds=mode != WALK)
 
     def covers(self, robot: str, first: int, last: int, *, plan: bool = False) -> bool:

@@ -12,7 +12,7 @@ from quadriga.shared.members import AGENT, PLANNER
 from quadriga.shared.messages import Event, Plan, Status
 from quadriga.shared.recording.ticks import TickTrack
 from quadriga.shared.robots.conventions import robot_names
-from quadriga.shared.topics import COMMAND, MEASUREMENT, STATE, TABLE, WORDS
+from quadriga.shared.topics import COMMAND, MEASUREMENT, REQUESTS, STATE, TABLE
 
 _MAY_REPEAT: Final = frozenset(topic.name for topic in TABLE if topic.repeats)
 # What is never passed over, not even in real time: agents and planners skip steps, others do not.
@@ -20,7 +20,7 @@ _WHOLE: Final = frozenset(t.name for t in TABLE if not {AGENT, PLANNER} & {*t.se
 _EVERYONE_S: Final = (STATE, COMMAND, MEASUREMENT)
 _CONTROLLER_S: Final = (STATE, COMMAND)  # of a controller of one's own
 # Sent by who only hears of the time, if somebody walks at all.
-_UNTIMED: Final = tuple(word.name for word in WORDS)
+_UNTIMED: Final = tuple(word.name for word in REQUESTS)
 _TAIL_MS: Final = 20  # a world that was stopped may end in the middle of a sample
 
 

@@ -22,9 +22,10 @@ from quadriga.shared.messages import (
     Reference,
     Reset,
     SafeStop,
+    Status,
     Truth,
 )
-from quadriga.shared.topics import ESTOP, TABLE, WORDS, Topic
+from quadriga.shared.topics import ESTOP, REQUESTS, TABLE, Topic
 from tests.a1 import standing
 
 NOTHING = Expected()
@@ -64,7 +65,7 @@ def feed(box: Inbox, *messages: tuple[str, Message]) -> None:
 
 def test_subscribes_to_what_it_needs_and_no_more() -> None:
     alone = {"team/r2/state", "team/reference", "team/sim/event"}
-    alone |= {f"team/{word.name}" for word in WORDS}
+    alone |= {f"team/{word.name}" for word in REQUESTS}
     peers = {f"team/{r}/{t}" for r in ("r1", "r3") for t in ("plan", "measurement")}
     assert {*arrivals(planner="none").keys} == alone
     assert {*arrivals(planner="centralised").keys} == alone | {"team/r2/plan"}
@@ -370,3 +371,16 @@ def test_a_release_that_comes_twice_is_one_and_another_is_another() -> None:
     assert resets == [Reset(5, 5, "ann"), None, Reset(6, 6, "ann")]
     feed(box, ("stop", SafeStop(5, 5, "ann", False)), ("stop", SafeStop(5, 5, "ann", False)))
     assert box.pop_inputs(standing(8), NOTHING).stop == SafeStop(5, 5, "ann", False)
+
+
+def test_in_real_time_statuses_of_the_others_are_handed_over_as_they_come() -> None:
+    box = arrivals("realtime", planner="none")
+    walks, stands = (
+        Status(tick, 0, mode, "", "", {}, {}, np.zeros(0), np.zeros(0))
+        for tick, mode in ((100, "walk"), (103, "stand"))
+    )
+    feed(box, ("r3/status", walks), ("r1/status", stands))
+    inputs = box.pop_inputs(standing(104), NOTHING)
+    assert [(n, said.mode) for n, said in inputs.statuses] == [("r1", "stand"), ("r3", "walk")]
+    assert not inputs.bare
+    assert box.pop_inputs(standing(105), NOTHING).bare

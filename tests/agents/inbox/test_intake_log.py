@@ -16,9 +16,8 @@ from quadriga.agents.inbox.intake_log import (
 )
 from quadriga.agents.planning.interface import NOTHING, Expected
 from quadriga.shared.codec import encode
-from quadriga.shared.codes import GONE
 from quadriga.shared.config.load import load
-from quadriga.shared.messages import Consumed, EStop, Event, Measurement, Plan, Reference, Status
+from quadriga.shared.messages import Consumed, EStop, Measurement, Plan, Reference, Status
 from tests.a1 import standing
 
 PLAN = Plan(480, 0, 12, np.zeros((25, 12)), np.zeros((25, 6)), "solved", {}, 1)
@@ -80,15 +79,14 @@ def test_a_step_that_took_in_the_next_state_alone_needs_no_record() -> None:
     assert again.number == 1
 
 
-def test_what_others_say_of_themselves_and_the_plant_of_them_is_listed_in_both_modes() -> None:
+def test_statuses_of_others_are_listed_in_both_modes() -> None:
     said = Status(500, 0, "walk", "", "", {}, {}, np.zeros(0), np.zeros(0))
-    gone = Event.of(503, GONE, "r1", "gone")
     for mode in ("realtime", "lockstep"):
         _, box = intake(mode)
-        told = Inputs(standing(504), statuses=(("r1", said),), events=(gone,))
+        told = Inputs(standing(504), statuses=(("r1", said),))
         found = box.record(503, told, NOTHING)
         assert found is not None
-        assert found.taken == ("status:r1:500", "sim/event:sim:503")
+        assert found.taken == ("status:r1:500",)
         assert [parse_message_id(text) for text in found.taken] == list_messages(told)
 
 

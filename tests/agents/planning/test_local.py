@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from quadriga.agents.gait import scheduled_stance
-from quadriga.agents.modes import STAND, STOPPING, WALK, Mode
 from quadriga.agents.planner.optimality import Residuals
 from quadriga.agents.planner.planner import PlanResult
 from quadriga.agents.planning.active_plan import Setpoint, setpoint_at
@@ -21,6 +20,7 @@ from quadriga.agents.planning.registry import CheckedPlanning
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config, PlannerConfig, TeamConfig
 from quadriga.shared.messages import Measurement, Plan
+from quadriga.shared.modes import STAND, STOPPING, WALK, Mode
 from quadriga.shared.robots.conventions import Array
 from tests.a1 import nominal_forces
 from tests.agents.duet import asked, simple_predictor

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from quadriga.agents.modes import STAND, WALK, Mode
 from quadriga.agents.planning.active_plan import setpoint_at
 from quadriga.agents.planning.interface import Expected, PlanningInputs, PlanningOutputs
 from quadriga.agents.planning.registry import CheckedPlanning, PlanningState
@@ -17,6 +16,7 @@ from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config, PlannerConfig, TeamConfig
 from quadriga.shared.config.timing import max_ages
 from quadriga.shared.messages import Measurement, Plan
+from quadriga.shared.modes import STAND, WALK, Mode
 from quadriga.shared.robots.conventions import Array
 from tests.a1 import nominal_forces
 from tests.agents.duet import asked

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from quadriga.agents.gait import scheduled_stance
-from quadriga.agents.modes import DAMPING, STOPPING, Mode
 from quadriga.agents.planner.planner import PlannerInputs
 from quadriga.agents.planner.team_planner import TeamPlanner, TeamResult, build_centralised
 from quadriga.agents.planning.reference_slew import ReferenceSlew
@@ -21,6 +20,7 @@ from quadriga.identification.rollout import Rollout
 from quadriga.shared.codec import encode
 from quadriga.shared.config.sections import Config, PlannerConfig, TeamConfig
 from quadriga.shared.messages import Measurement, Reference
+from quadriga.shared.modes import PASSIVE, STOPPING, Mode
 from quadriga.shared.robots.conventions import Array
 from tests.a1 import nominal_forces
 from tests.agents.duet import asked, every_100_ms, fingerprint, simple_predictor
@@ -220,7 +220,7 @@ def test_the_stand_before_the_first_step_is_none() -> None:
     assert central.due(state) == 8
 
 
-@pytest.mark.parametrize("mode", [Mode(DAMPING, 400, "fall"), Mode(STOPPING, 400, "peer")])
+@pytest.mark.parametrize("mode", [Mode(PASSIVE, 400, "fall"), Mode(STOPPING, 400, "peer")])
 def test_when_one_robot_has_stopped_the_other_does_not_go_on(mode: Mode) -> None:
     config = replace(CONFIG, planner=replace(CONFIG.planner, latency_ms=0))
     planner = build_centralised(config, simple_predictor(config))

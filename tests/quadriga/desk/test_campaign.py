@@ -67,10 +67,10 @@ def cells(table: Table, name: str) -> dict[str, str]:
 
 ON = "time-over: end of world.duration; late ticks: r1 5"
 OUTCOMES = (
-    ("walked on", {"end": ON, "said": {"r1": ["walking", "lying-down"]}, "rest_ms": {"r1": 8000}}),
+    ("walked on", {"end": ON, "said": {"r1": ["walk", "lying-down"]}, "rest_ms": {"r1": 8000}}),
     ("lay down", {"end": "none", "said": {"r1": ["lying-down"]}, "rest_ms": {"r1": 3000}}),
-    ("damped", {"end": ON, "said": {"r1": ["walking"]}, "rest_ms": {"r1": 70}}),
-    ("still driven", {"end": "none", "said": {"r1": ["walking"]}, "rest_ms": {"r1": None}}),
+    ("damped", {"end": ON, "said": {"r1": ["walk"]}, "rest_ms": {"r1": 70}}),
+    ("still driven", {"end": "none", "said": {"r1": ["walk"]}, "rest_ms": {"r1": None}}),
 )
 
 
@@ -80,10 +80,7 @@ def test_what_became_of_a_robot(outcome: str, fields: dict[str, Any]) -> None:
 
 
 def test_faults_summed_up() -> None:
-    said = {
-        "r2": ["walking", "stopped command-late:51 ms"],
-        "r1": ["walking", "lying-down", "limp"],
-    }
+    said = {"r2": ["walk", "estop command-late:51 ms"], "r1": ["walk", "lying-down", "limp"]}
     end = {"end": "fallen: fall of r2"}
     rests = [{"r1": 4000, "r2": 52}, {"r1": 4000, "r2": 54}]
     rows = [
@@ -103,14 +100,14 @@ def test_faults_summed_up() -> None:
     )
     assert (found["ms to damping p50"], found["max"]) == ("53", "54")
     assert (found["others lay down"], found["others fell"]) == ("2", "1")
-    assert found["its bridge's last word"] == "stopped command-late (2)"
+    assert found["its bridge's last word"] == "estop command-late (2)"
 
 
 def test_walks_summed_up_beside_those_without_bridges() -> None:
     answers = {"answer.median": 1.0, "answer.p99": 2.0, "answer.max": 3.0, "share": 0.1}
     ages = {"command.median": 0.0, "command.p99": 1.0, "command.max": 2.0, "share": 0.0}
     figures = {"vx": 0.5, "vy_rms": 0.01, "wz_rms": 0.02, "roll_rms": 0.003, "pitch_rms": 0.004}
-    said = {"r1": ["walking", "stopped speed:RL"]}
+    said = {"r1": ["walk", "estop speed:RL"]}
     rows = [
         row("none", 1, figures={"r1": figures}, late={"r1": answers}, said=said),
         row("none", 2, figures={"r1": answers}, late={"r1": ages}, fell=["r1"], kept=0.97),

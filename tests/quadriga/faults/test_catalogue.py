@@ -13,7 +13,6 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.members import OPERATOR
 from quadriga.shared.robots.registry import ROBOTS
-from quadriga.shared.runtime.clock import monotonic
 from quadriga.sim_server.world.faults import build_components, parse_faults
 from quadriga.team.launch import Launch, ProcessSpec, process_table
 
@@ -64,7 +63,6 @@ def test_every_fault_is_one_that_can_be_made(fault: TeamFault, tmp_path: Path) -
         ("operator-paused", "", 0.0),
         ("router-frozen", "", None),
         ("router-paused", "", 0.0),
-        ("agent-restarted", "r3", 0.0),
         ("sim-killed", "", None),
         ("agent-slow", "r3", 0.0),
         ("subscriber-slow", "", None),
@@ -89,19 +87,6 @@ def test_who_is_paused_goes_on(tmp_path: Path) -> None:
         state = Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()[0]
         assert state != "T"
         assert not scene.struck  # it leaves by itself
-
-
-def test_who_is_restarted_is_another_process_after_a_while(tmp_path: Path) -> None:
-    draw = draw_fault(Config(), 7)
-    with Launch([_SLEEPER], tmp_path) as launch:
-        before, begun = launch.pids[OPERATOR], monotonic()
-        with BY_NAME["operator-restarted"].stage(Config(), draw, tmp_path) as stage:
-            assert stage.config.team.auto_resume
-            assert stage.strike is not None
-            stage.strike(FaultScene(stage.config, draw, tmp_path, launch))
-        assert monotonic() - begun >= 1.0
-        assert launch.pids[OPERATOR] != before
-        assert launch.alive == {OPERATOR}
 
 
 @pytest.mark.parametrize("name", ["clock-step", "clock-drift"])

@@ -105,17 +105,17 @@ def test_what_the_world_announces_is_a_notice_and_the_fault_itself_is_not(
 ) -> None:
     events = [
         Event.of(FAULT, codes.FAULT_BEGINS, "r2", "imu stuck"),
-        Event.of(FAULT + 70, codes.GONE, "r2", "gone"),
-        Event.of(FAULT + 90, codes.LOWERED, "r2", "no command"),
-        Event.of(FAULT + 900, codes.FALL, "r2", "tilt"),
-        Event.of(FAULT + 950, codes.FALL, "r3", "tilt"),
+        Event.of(FAULT + 70, codes.MALFORMED, "r2", "3 commands dropped"),
+        Event.of(FAULT + 90, codes.FALL, "r2", "tilt"),
+        Event.of(FAULT + 95, codes.FALL, "r3", "tilt"),
+        Event.of(FAULT + 99, codes.COMMAND_LOST, "", "r2, r3 gone"),
     ]
     folder = write_run(CONFIG, extra=[("team/sim/event", event) for event in events])
     row = outcome(folder, Moment("r2", FAULT))
     assert row["detect_ms"] == 70
     assert row["falls"] == ["r2", "r3"]
     assert row["falls_of_others"] == 1
-    assert row["lowered"] == ["r2"]
+    assert row["lost"] == ["r2", "r3"]
 
 
 def test_what_the_launcher_tells_of_a_fault_is_an_event_and_changes_no_figure(
@@ -126,7 +126,7 @@ def test_what_the_launcher_tells_of_a_fault_is_an_event_and_changes_no_figure(
         Event.of(FAULT + 300, codes.FAULT_ENDS, "r2", "agent-paused is over"),
         Event.of(FAULT + 400, codes.SIGNAL, "", "only who drives time ends a walk"),
     ]
-    notice = ("team/sim/event", Event.of(FAULT + 70, codes.GONE, "r2", "gone"))
+    notice = ("team/sim/event", Event.of(FAULT + 70, codes.MALFORMED, "r2", "3"))
     folder = write_run(CONFIG, extra=[*(("team/injected", event) for event in told), notice])
     row = outcome(folder, Moment("r2", FAULT))
     assert (row["tick"], row["detect_ms"], row["lost_messages"]) == (FAULT, 70, 0)
@@ -170,16 +170,14 @@ def test_a_recording_that_ends_before_the_fault_has_lost_what_came_after(
 
 def test_what_the_recording_lacks_the_world_has_told(write_run: WriteRun) -> None:
     told = [
-        Event.of(FAULT + 22, codes.GONE, "r2", "gone"),
-        Event.of(FAULT + 210, codes.LOWERED, "r2", "no command"),
-        Event.of(FAULT + 900, codes.FALL, "r3", "tilt"),
-        Event.of(FAULT + 4000, codes.TIME_OVER, "", "end of world.duration"),
+        Event.of(FAULT + 20, codes.FALL, "r3", "tilt"),
+        Event.of(FAULT + 22, codes.COMMAND_LOST, "", "r2 gone"),
     ]
     recording = Recording(write_run(CONFIG) / "run.mcap")
     moment = Moment("r2", FAULT)
     row = describe_outcome(CONFIG, read_traces(recording), recording, moment, told)
-    assert (row["detect_ms"], row["falls"], row["lowered"]) == (22, ["r3"], ["r2"])
-    assert row["end"] == "time-over: end of world.duration"
+    assert (row["detect_ms"], row["falls"], row["lost"]) == (22, ["r3"], ["r2"])
+    assert row["end"] == "command-lost: r2 gone"
     assert row["recover_ms"] is None  # what the robots did then nobody has recorded
 
 

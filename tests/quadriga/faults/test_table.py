@@ -25,7 +25,7 @@ def row(**fields: Any) -> dict[str, Any]:
         "robot": "r2",
         "tick": 3000,
         "falls": [],
-        "lowered": [],
+        "lost": [],
         "falls_of_others": 0,
         "detect_ms": None,
         "stand_ms": None,
@@ -46,7 +46,7 @@ def test_a_line_for_each_fault_with_what_came_of_it() -> None:
     rows = [
         row(),
         row(status=STOOD, detect_ms=60, stand_ms=300, lost_messages=4, recover_ms=None),
-        row(lowered=["r2"], detect_ms=80, stand_ms=400, status={"r1": STOOD["r1"], "r2": "walk"}),
+        row(lost=["r2"], detect_ms=80, stand_ms=400, status={"r1": STOOD["r1"], "r2": "walk"}),
         row(falls=["r1", "r2"], falls_of_others=1, end="fallen: fall of r1", detect_ms=100),
         {"fault": "agent-killed", "seed": 5, "error": "the team: got no walk"},
         row(fault="imu-stuck", mode="lockstep"),
@@ -90,12 +90,12 @@ def test_what_the_doctor_said_of_most_processes() -> None:
 
 
 def test_who_is_led_down_has_not_walked_on() -> None:
-    _, words = build_team_fault_tables([row(lowered=["r2"], detect_ms=15)])
+    _, words = build_team_fault_tables([row(lost=["r2"], detect_ms=15)])
     assert (cells(words, "agent-killed")["walked on"], cells(words, "agent-killed")["stopped"]) == (
         "0",
         "1",
     )
-    assert "led down: r2" in describe_row(row(lowered=["r2"]))
+    assert "without commands: r2" in describe_row(row(lost=["r2"]))
 
 
 def test_goals_and_the_worst_of_what_came() -> None:

@@ -83,11 +83,11 @@ def test_a_fault_is_told_with_its_robot_its_tick_and_its_end(config: Config, sim
 
 def test_who_records_only_afterwards_hears_that_it_is_over(config: Config, sim: Bus) -> None:
     with Bus.open(config.bus, "team", LAUNCHER) as bus:
-        teller = FaultTeller(bus, "recorder-restarted", Stage(config, lasts=0.0))
+        teller = FaultTeller(bus, "recorder-paused", Stage(config, lasts=0.0))
         run_clock(sim, teller, 2500)
         with teller.telling_end(monotonic()), open_recorder(config) as recorder:
             (ends,) = hear(recorder, 1)
-    assert ends == Event.of(2500, codes.FAULT_ENDS, "", "recorder-restarted is over")
+    assert ends == Event.of(2500, codes.FAULT_ENDS, "", "recorder-paused is over")
 
 
 def test_an_end_that_no_clock_has_told_is_where_the_walk_was_by_this_computers(
@@ -95,7 +95,7 @@ def test_an_end_that_no_clock_has_told_is_where_the_walk_was_by_this_computers(
 ) -> None:
     with open_recorder(config) as recorder, Bus.open(config.bus, "team", LAUNCHER) as bus:
         recorder.declare(HERE)
-        teller = FaultTeller(bus, "router-restarted", Stage(config, lasts=0.0))
+        teller = FaultTeller(bus, "router-paused", Stage(config, lasts=0.0))
         run_clock(sim, teller, 2000)
         struck = monotonic()
         with teller.telling_end(struck):

@@ -24,7 +24,6 @@ from quadriga.shared.config.sections import (
     TeamConfig,
     WorldConfig,
 )
-from quadriga.shared.recording.reader import Recording
 from quadriga.shared.recording.writer import RecordingWriter
 from tests.plugins.kinds import install_kind
 from tests.quadriga.conftest import WriteRun, run_config, write
@@ -339,40 +338,6 @@ def test_robots_that_stand_for_a_while_owe_no_plans(tmp_path: Path, says_so: boo
     findings = by_name(check(run / "run.mcap"))
     assert findings["gaps"].objections == (0 if says_so else 10)
     assert summarise(run)["gaps"] == (0 if says_so else 10)
-
-
-def test_what_lies_between_two_parts_of_a_walk_is_told(tmp_path: Path) -> None:
-    """Its recorder was killed, and another one went on in a file of its own."""
-    whole = write(tmp_path / "a", SHORT) / "run.mcap"
-
-    def late(key: str, message: msg.Message) -> msg.Message | None:
-        return message if message.tick >= 1250 else None
-
-    second = write(tmp_path / "b", SHORT, change=late) / "run.mcap"
-    part = rename(second, tmp_path / "a" / "run.2.mcap", {"continues": "../a/run.mcap"})
-    finding = by_name(check(part))["continued"]
-    assert finding.passed, "it begins before the first one ends"
-
-    def early(key: str, message: msg.Message) -> msg.Message | None:
-        return message if message.tick <= 1000 else None
-
-    whole.unlink()
-    rename(write(tmp_path / "c", SHORT, change=early) / "run.mcap", whole, {})
-    finding = by_name(check(part))["continued"]
-    assert finding.objections == 249
-    assert finding.first[0].got == "249 ms missing after tick 1000 of run.mcap"
-    whole.unlink()
-    finding = by_name(check(part))["continued"]
-    assert "what is missing after run.mcap is not known" in finding.notes[0]
-
-
-def rename(path: Path, target: Path, more: dict[str, str]) -> Path:
-    """A recording again, with more in its metadata."""
-    recording = Recording(path)
-    with RecordingWriter(target, {**recording.metadata, **more}, 256, periods={}) as writer:
-        for entry in recording.entries():
-            writer.write(entry.key, entry.payload, entry.log_time_ns)
-    return target
 
 
 def test_a_damaged_file_fails_and_the_rest_is_checked(

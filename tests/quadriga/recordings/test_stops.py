@@ -27,15 +27,12 @@ def with_events(traces: Traces, *events: Event, controller: str = "walk") -> Tra
 
 
 def test_what_the_plant_saw_counts_of_a_controller_of_ones_own(traces: Traces) -> None:
-    silent = Event.of(500, codes.SILENT, "r1", "silent for 10 s")
-    back, gone = Event.of(600, codes.BACK, "r1", ""), Event.of(700, codes.GONE, "r2", "gone")
-    assert find_stops(with_events(traces, silent, gone)) == {
-        "r1": "silent:silent for 10 s",
-        "r2": "gone:gone",
-    }
-    assert find_stops(with_events(traces, silent, back)) == {}
+    gone = Event.of(700, codes.COMMAND_LOST, "", "r2, r1 gone")
+    reason = "command-lost:r2, r1 gone"
+    assert find_stops(with_events(traces, gone)) == {"r1": reason, "r2": reason}
+    silent = Event.of(500, codes.COMMAND_LOST, "", "r1 silent for 10 s")
     assert find_stops(with_events(traces, silent, controller="")) == {
-        "r1": "silent:silent for 10 s"
+        "r1": "command-lost:r1 silent for 10 s"
     }
 
 
@@ -43,5 +40,5 @@ def test_a_robot_that_never_sent_a_command_has_failed(traces: Traces) -> None:
     key = COMMAND.key(traces.config.team.name, "r2")
     mute = replace(traces, messages={k: n for k, n in traces.messages.items() if k != key})
     stops = find_stops(with_events(mute, controller=""))
-    assert stops == {"r2": "silent:it has never sent a command"}
+    assert stops == {"r2": "command-lost:it has never sent a command"}
     assert has_failed({"fell": False, "lost": 0, "stop_reasons": stops})

@@ -133,28 +133,6 @@ def test_stopping_kills_who_does_not_obey_in_his_time(tmp_path: Path) -> None:
     assert all(gone(pid) for pid in pids.values())
 
 
-def test_who_has_ended_is_started_again_and_its_log_goes_on(tmp_path: Path) -> None:
-    code = f"print('up'); {LAST}"
-    with Launch([row("sim", code), row("r1", LAST)], tmp_path) as running:
-        await_lines(tmp_path / "sim.log", 1)
-        before = running.pids
-        os.kill(before["sim"], signal.SIGKILL)
-        running.restart("sim")
-        await_lines(tmp_path / "sim.log", 2)
-        after = running.pids
-        assert after["sim"] != before["sim"]
-        assert after["r1"] == before["r1"]
-    assert all(gone(pid) for pid in after.values())
-
-
-def test_nobody_is_started_twice(tmp_path: Path) -> None:
-    with Launch([row("sim", LAST, grace=0.1)], tmp_path) as running:
-        with pytest.raises(ProcessError, match="process sim: got still running"):
-            running.restart("sim")
-        with pytest.raises(ProcessError, match="process r9: got no row, expected one of sim"):
-            running.restart("r9")
-
-
 def test_the_log_of_who_floods_it_is_cut(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(launch, "_LARGEST_LOG", 1 << 20)
     code = """

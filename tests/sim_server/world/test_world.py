@@ -5,7 +5,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from quadriga.plant.late import MOTOR_DAMPING
+from quadriga.plant.commands import MOTOR_DAMPING
 from quadriga.shared.codec import decode, encode
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError

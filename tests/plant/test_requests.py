@@ -1,10 +1,10 @@
-"""What people have said to a plant, over a bus of its own."""
+"""What people have asked of a plant, over a bus of its own."""
 
 from __future__ import annotations
 
 import pytest
 
-from quadriga.plant.words import NO_WORDS, Words, listen_to_words
+from quadriga.plant.requests import NO_REQUESTS, Requests, subscribe_requests
 from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.codec import encode
 from quadriga.shared.config.load import load
@@ -22,20 +22,20 @@ LUNCH = SafeStop(1, 0, "lunch", True)
 @pytest.mark.parametrize(
     ("topic", "payloads", "heard"),
     [
-        (ESTOP, [EStop(1, 0, "dog"), EStop(2, 0, "cat")], Words("dog")),
-        (ESTOP, [EStop(1, 0, "")], Words("estop")),
-        (ESTOP, [b"stop!"], Words("unreadable")),
-        (RESET, [FIRST, LAST, b"no"], Words(reset=LAST)),
-        (STOP, [LUNCH], Words(stop=LUNCH)),
-        (LIVE_FAULT, [GONE, b"no", STUCK], Words(faults=(GONE.fault, STUCK.fault))),
+        (ESTOP, [EStop(1, 0, "dog"), EStop(2, 0, "cat")], Requests("dog")),
+        (ESTOP, [EStop(1, 0, "")], Requests("estop")),
+        (ESTOP, [b"stop!"], Requests("unreadable")),
+        (RESET, [FIRST, LAST, b"no"], Requests(reset=LAST)),
+        (STOP, [LUNCH], Requests(stop=LUNCH)),
+        (LIVE_FAULT, [GONE, b"no", STUCK], Requests(faults=(GONE.fault, STUCK.fault))),
     ],
 )
 def test_an_unreadable_stop_is_one_and_nothing_else_that_is_unreadable(
-    topic: Topic, payloads: list[Message | bytes], heard: Words
+    topic: Topic, payloads: list[Message | bytes], heard: Requests
 ) -> None:
     config = load(None, {"bus.endpoint": free_endpoint()})
     with Bus.open(config.bus, "team", SIM) as sim, Bus.open(config.bus, "team", "who") as who:
-        words, put = listen_to_words(sim), who.publisher(topic.key("team"))
+        requests, put = subscribe_requests(sim), who.publisher(topic.key("team"))
         seen = sim.collect(topic.key("team"))
         sim.declare(HERE)
         assert who.wait_for(HERE, {SIM}, 10.0, lambda: False)
@@ -46,5 +46,5 @@ def test_an_unreadable_stop_is_one_and_nothing_else_that_is_unreadable(
             assert monotonic() < deadline
             count += len(seen())
             sleep(0.001)
-        assert words() == heard
-        assert words() == NO_WORDS
+        assert requests() == heard
+        assert requests() == NO_REQUESTS

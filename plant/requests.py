@@ -1,4 +1,4 @@
-"""What people have said to a plant since it was asked last."""
+"""What people have asked of a plant since it was called last."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ _UNREADABLE: Final = "unreadable"
 _KINDS: Final = {ESTOP: EStop, RESET: Reset, STOP: SafeStop, LIVE_FAULT: LiveFault}
 
 
-class Words(NamedTuple):
-    """What was said; of several of a kind the last, of emergency stops the first.
+class Requests(NamedTuple):
+    """What was asked for; of several of a kind the last, of emergency stops the first.
 
     Attributes:
         estop: why the team's emergency stop was pressed; "" if it was not.
         reset: the operator's release of one.
-        stop: somebody's wish that the team slow down and stand.
+        stop: somebody's request that the team slow down and stand.
         faults: faults of sensors and motors that somebody has asked for.
     """
 
@@ -32,45 +32,45 @@ class Words(NamedTuple):
     faults: tuple[str, ...] = ()
 
 
-NO_WORDS: Final = Words()
+NO_REQUESTS: Final = Requests()
 
 
-def listen_to_words(bus: Bus) -> Callable[[], Words]:
-    """A function that gives what people have said since it was called last.
+def subscribe_requests(bus: Bus) -> Callable[[], Requests]:
+    """A function that gives what people have asked for since it was called last.
 
-    It is called at every tick and has nearly always nothing to tell, so it looks in one place.
+    It is called at every tick and nearly always finds nothing, so it looks in one place.
     """
     kinds = {topic.key(bus.team): kind for topic, kind in _KINDS.items()}
     take = bus.collect(*kinds)
 
-    def said() -> Words:
+    def receive() -> Requests:
         arrived = take()
-        return _sort(kinds, arrived) if arrived else NO_WORDS
+        return _sort(kinds, arrived) if arrived else NO_REQUESTS
 
-    return said
+    return receive
 
 
-def listen_to_estops(bus: Bus) -> Callable[[], str]:
+def subscribe_estops(bus: Bus) -> Callable[[], str]:
     """A function that tells why the emergency stop was pressed; "" until it is."""
     take = bus.collect(ESTOP.key(bus.team))
     return lambda: next((_reason_of(payload) for _, _, payload in take()), "")
 
 
-def _sort(kinds: Mapping[str, type[Message]], arrived: Iterable[Arrival]) -> Words:
-    words = NO_WORDS
+def _sort(kinds: Mapping[str, type[Message]], arrived: Iterable[Arrival]) -> Requests:
+    requests = NO_REQUESTS
     for _, key, payload in arrived:
         if kinds[key] is EStop:
-            words = words._replace(estop=words.estop or _reason_of(payload))
+            requests = requests._replace(estop=requests.estop or _reason_of(payload))
             continue
         with suppress(MessageError):
             message = decode(payload, kinds[key])
             if isinstance(message, Reset):
-                words = words._replace(reset=message)
+                requests = requests._replace(reset=message)
             elif isinstance(message, SafeStop):
-                words = words._replace(stop=message)
+                requests = requests._replace(stop=message)
             elif isinstance(message, LiveFault):
-                words = words._replace(faults=(*words.faults, message.fault))
-    return words
+                requests = requests._replace(faults=(*requests.faults, message.fault))
+    return requests
 
 
 def _reason_of(payload: bytes) -> str:
