@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 from quadriga.plant.protocol import TOLD_TO_STOP, End
 from quadriga.plant.server import PlantServer
-from quadriga.plant.team_time import plant_gone
 from quadriga.shared.bus.session import HERE, POLL
 from quadriga.shared.messages import Command
 from quadriga.shared.runtime.clock import monotonic
@@ -17,10 +16,9 @@ def run_lockstep(server: PlantServer, stopped: Callable[[], bool]) -> End:
     while not stopped():
         server.publish()
         commands = _await_commands(server, stopped)
-        end = _await_plants(server, stopped)
-        if end is None and stopped():
+        if stopped():
             break  # commands may be missing that nobody has lost
-        end = end or server.step(commands)
+        end = server.time.end or server.step(commands)
         if end is not None:
             return end
     return TOLD_TO_STOP
@@ -40,25 +38,5 @@ def _await_commands(server: PlantServer, stopped: Callable[[], bool]) -> dict[st
             server.end_without(waiting, f"silent for {patience:g} s")
         else:
             server.check_link()
-            present = bus.members_at(HERE)
-            server.time.look(present)
-            server.end_without(waiting - present, "gone")
+            server.end_without(waiting - bus.members_at(HERE), "gone")
     return {name: box.latest[name] for name in server.plant.names if box.tick_of(name) == tick}
-
-
-def _await_plants(server: PlantServer, stopped: Callable[[], bool]) -> End | None:
-    """Wait until the other plants let this tick be taken; why the walk ends, if it does."""
-    tick, time, bus = server.plant.tick, server.time, server.bus
-    # Longer than a plant waits for its own robot, for which this one then waits too.
-    patience = 2.0 * server.config.world.command_timeout
-    deadline = monotonic() + patience
-    while time.end is None and (waiting := time.awaited(tick)) and not stopped():
-        packet = bus.get(POLL)
-        if packet is not None:
-            server.take(*packet, oldest=tick)
-        elif monotonic() > deadline:
-            time.end = plant_gone(sorted(waiting), f"silent for {patience:g} s")
-        else:
-            server.check_link()
-            time.look(bus.members_at(HERE))
-    return time.end

@@ -1,10 +1,8 @@
-"""The plants of a team among each other: who drives time, who waits for whom, when one must end.
+"""The plants of a team among each other, in real time: who drives time, when one must end.
 
 The plant of all robots has nobody to ask. Where each robot has a plant of its own, that of the
-first robot drives time. In lock-step no follower takes a tick before the clock has come to its
-end, and the clock waits for every state and command of a tick: so the team ends as one, and what
-is recorded does not depend on who was faster. In real time ticks begin by the system clocks, see
-`plant.pace`, and a plant whose messages are too old is given up.
+first robot drives time. Ticks begin by the system clocks, see `plant.pace`, and a plant whose
+messages are too old is given up.
 """
 
 from __future__ import annotations
@@ -20,9 +18,9 @@ from quadriga.shared.errors import MessageError
 from quadriga.shared.members import has_lead, plant_name
 from quadriga.shared.messages import Clock, Event
 from quadriga.shared.robots.conventions import robot_names
-from quadriga.shared.topics import CLOCK, COMMAND, EVENT, STATE
+from quadriga.shared.topics import CLOCK, EVENT, STATE
 
-_LOOKS: Final = 10  # in real time one each sample, until a plant that is not there is given up
+_LOOKS: Final = 10  # one each sample, until a plant that is not there is given up
 _JUMP_MS: Final = 5000  # no plant of a team that still walks is so far ahead
 
 
@@ -47,10 +45,6 @@ class TeamTime:
     def take(self, key: str, payload: bytes, tick: int) -> None:
         """Take in a packet of one of `keys` at this plant's `tick`."""
 
-    def awaited(self, tick: int) -> frozenset[str]:
-        """Plants without which this one may not take `tick` in lock-step."""
-        return frozenset()
-
     def behind(self, oldest: int) -> frozenset[str]:
         """Plants on which this one depends, and whose newest message is of before tick `oldest`."""
         return frozenset()
@@ -68,17 +62,15 @@ class LeadTime(TeamTime):
         super().__init__()
         team, self._event = config.team.name, EVENT.key(config.team.name)
         names = [name for name in robot_names(config.team.robots) if name != robot]
-        # By robot the keys of its plant and of its agent, and by key the newest tick, −1 at first.
-        self._others = {name: (STATE.key(team, name), COMMAND.key(team, name)) for name in names}
-        self._newest = {key: -1 for keys in self._others.values() for key in keys}
+        self._others = {name: STATE.key(team, name) for name in names}
+        self._newest = dict.fromkeys(self._others.values(), -1)  # tick
         self.keys = frozenset({*self._newest, self._event})
-        self._most_ahead = _JUMP_MS if config.world.mode == "realtime" else 0
 
     def take(self, key: str, payload: bytes, tick: int) -> None:
         head = envelope(payload)
         if key == self._event:
             self._take_event(payload)
-        elif head is not None and head[0] <= tick + self._most_ahead:
+        elif head is not None and head[0] <= tick + _JUMP_MS:
             self._newest[key] = max(self._newest[key], head[0])
 
     def _take_event(self, payload: bytes) -> None:
@@ -93,16 +85,8 @@ class LeadTime(TeamTime):
         elif event.code in codes.DOWN:
             self.falls.append(event)
 
-    def awaited(self, tick: int) -> frozenset[str]:
-        unanswered = (
-            plant_name(name)
-            for name, (_, command) in self._others.items()
-            if self._newest[command] < tick
-        )
-        return self.behind(tick).union(unanswered)
-
     def behind(self, oldest: int) -> frozenset[str]:
-        found = (n for n, (state, _) in self._others.items() if self._newest[state] < oldest)
+        found = (name for name, key in self._others.items() if self._newest[key] < oldest)
         return frozenset(map(plant_name, found))
 
     def look(self, present: Collection[str]) -> None:
@@ -122,8 +106,8 @@ class FollowerTime(TeamTime):
         self.keys = frozenset({self._key, self._event})
         self._lead = frozenset({plant_name(robot_names(config.team.robots)[0])})
         self._now = -1
-        # A process's last words may arrive after its token has vanished; lock-step waits for them.
-        self._looks_left = _LOOKS if config.world.mode == "realtime" else 1
+        # The last messages of a process may arrive after its token has vanished.
+        self._looks_left = _LOOKS
 
     def take(self, key: str, payload: bytes, tick: int) -> None:
         try:
@@ -137,9 +121,6 @@ class FollowerTime(TeamTime):
             return
         if self._now < now <= tick + _JUMP_MS:
             self._now = now
-
-    def awaited(self, tick: int) -> frozenset[str]:
-        return self.behind(tick + 1)
 
     def behind(self, oldest: int) -> frozenset[str]:
         return self._lead if self._now < oldest else frozenset()

@@ -84,7 +84,7 @@ INJECTED: Final = Topic("injected", msg.Event, (LAUNCHER,), (), period_ms=0, rep
 # Not recorded: the states of every tick tell the same.
 CLOCK: Final = Topic(
     "clock", msg.Clock, (SIM,), (OPERATOR, LAUNCHER, *_SPEAKERS, SIM),
-    period_ms=CONFIGURED, recorded=False,
+    period_ms=SAMPLE_MS, recorded=False,
 )  # fmt: skip
 # For who watches: states of some ticks alone. Not recorded either.
 POSTURE: Final = Topic(

@@ -26,11 +26,11 @@ from quadriga.shared.config.write import to_toml
 from quadriga.shared.errors import ProcessError, RecordingError
 from quadriga.shared.members import LAUNCHER, SIM, has_lead
 from quadriga.shared.messages import parse_events
+from quadriga.shared.recording.reader import Recording
 from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.runtime.atomic import write_text
 from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns
 from quadriga.shared.runtime.scheduling import go_first, leave_priority
-from quadriga.shared.recording.reader import Recording
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import Launch, process_table, router_row
 from quadriga.team.run_folder import CONFIG

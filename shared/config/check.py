@@ -166,12 +166,19 @@ def _check_cooperation(planner: PlannerConfig) -> None:
 
 
 def _check_plants(config: Config) -> None:
-    """What plants of a robot each cannot do: be yoked in simulation, or know the whole truth."""
+    """What plants of a robot each cannot do: wait, be yoked in simulation, or know all truth."""
     team = config.team
     if team.plant == BRIDGED:
         _check_bridged(config)
     if not team.plant_per_robot:
         return
+    if config.world.mode != "realtime":
+        raise ConfigError(
+            "world.mode",
+            f"{config.world.mode!r} with team.plant_per_robot = true",
+            "'realtime', or team.plant_per_robot = false",
+            "plants of one robot go by the clock and wait for nobody",
+        )
     if config.estimator.kind == "truth":
         raise ConfigError(
             "estimator.kind",
@@ -190,17 +197,11 @@ def _check_plants(config: Config) -> None:
 
 def _check_bridged(config: Config) -> None:
     """Robots have a bridge each, and their own time."""
-    for name, value, wanted, cause in (
-        (
-            "team.plant_per_robot",
-            str(config.team.plant_per_robot).lower(),
-            "true",
-            "every robot has a bridge of its own",
-        ),
-        ("world.mode", config.world.mode, "realtime", "robots do not wait for a command"),
-    ):
-        if value != wanted:
-            raise ConfigError(name, f"{value} with team.plant {BRIDGED!r}", wanted, cause)
+    if not config.team.plant_per_robot:
+        cause = "every robot has a bridge of its own"
+        raise ConfigError(
+            "team.plant_per_robot", f"false with team.plant {BRIDGED!r}", "true", cause
+        )
 
 
 def _check_controller(config: Config) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from quadriga.shared.config.sections import BRIDGED, Config
 from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.topics import (
-    CLOCK,
     COMMAND,
     CONFIGURED,
     PLAN,
@@ -21,15 +20,12 @@ from quadriga.shared.topics import (
 def periods(config: Config) -> dict[str, int]:
     """World time between two messages of a topic by its name, ms; 0: sent on event.
 
-    In real time an agent that was late says its status later. Several plants in lock-step follow
-    every tick of the clock; an operator needs no more than every tenth. Robots behind bridges speak
+    In real time an agent that was late says its status later. Robots behind bridges speak
     by clocks of their own: all that is sure is a state at every sample.
     """
-    lockstep = config.world.mode == "lockstep"
     configured = {
-        CLOCK: 1 if lockstep and config.team.plant_per_robot else SAMPLE_MS,
         PLAN: SAMPLE_MS * config.planner.applied,
-        STATUS: STATUS_MS if lockstep else 0,
+        STATUS: STATUS_MS if config.world.mode == "lockstep" else 0,
         TRUTH: 1 if config.estimator.kind == "truth" else SAMPLE_MS,
     }
     found = {

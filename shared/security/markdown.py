@@ -12,7 +12,7 @@ from quadriga.shared.security.access import Rights, team_rights
 PAGE: Final = SOURCE / "docs" / "security.md"
 _BEGIN: Final = "<!-- rights: made by python -m quadriga.shared.security.markdown -->\n"
 _END: Final = "<!-- end of rights -->\n"
-_EACH: Final = {"team.plant_per_robot": True, "team.yokes": "none"}
+_EACH: Final = {"team.plant_per_robot": True, "world.mode": "realtime", "team.yokes": "none"}
 
 
 def rights_table() -> str:

@@ -59,7 +59,7 @@ def test_after_a_loss_it_resumes_once_all_inputs_have_been_there_for_a_second(re
 def test_after_a_stop_or_a_reset_it_resumes_only_when_asked_to(reason: str) -> None:
     mode = Mode(STAND, 1700, f"{reason}:ann")
     assert not begins(AUTO, mode, 2000)
-    assert begins(AUTO, mode, 2000, requested=3000)
+    assert begins(AUTO, mode, 2000, requested=BEGIN - 100)
 
 
 @pytest.mark.parametrize(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import pytest
-
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config, EstimatorConfig, PlannerConfig, WorldConfig
 from quadriga.shared.config.timing import max_ages, periods
@@ -20,17 +18,6 @@ def test_periods_follow_the_configuration() -> None:
     )
     assert (periods(other)["plan"], periods(other)["sim/truth"]) == (20, 1)
     assert periods(other)["status"] == 0
-
-
-@pytest.mark.parametrize(
-    ("mode", "own", "period"),
-    [("lockstep", False, 10), ("lockstep", True, 1), ("realtime", True, 10)],
-)
-def test_plants_in_lock_step_follow_every_tick_of_the_clock(
-    mode: str, own: bool, period: int
-) -> None:
-    given = {"world.mode": mode, "team.plant_per_robot": own, "team.yokes": "none"}
-    assert periods(load(None, given))["clock"] == period
 
 
 def test_what_the_table_says_holds_whatever_is_configured() -> None:

@@ -23,7 +23,7 @@ from quadriga.shared.security.access import (
 from quadriga.shared.security.markdown import PAGE, renewed
 from quadriga.shared.topics import COMMAND, STATE, TABLE, Topic
 
-EACH = {"team.plant_per_robot": True, "team.yokes": "none"}
+EACH = {"team.plant_per_robot": True, "world.mode": "realtime", "team.yokes": "none"}
 
 
 def rights(**given: object) -> dict[str, Rights]:
