@@ -46,8 +46,7 @@ def test_truth_is_expected_of_one_simulated_world_alone() -> None:
     ticks = whole(10)
     del ticks["team/sim/truth"]
     assert missing_ticks(configured(), ticks)["team/sim/truth"] == 99
-    for other in ({"team__plant_per_robot": True}, {"team__plant": "puppet"}):
-        assert "team/sim/truth" not in missing_ticks(configured(**other), ticks)
+    assert "team/sim/truth" not in missing_ticks(configured(team__plant="puppet"), ticks)
 
 
 def test_a_robot_of_which_nothing_came_lacks_everything() -> None:
@@ -75,8 +74,8 @@ def says(tick: int, mode: str) -> Status:
 
 
 def test_nothing_is_expected_that_a_robot_says_it_does_not_make() -> None:
-    """It stands up at 100, stands from 300 to 500, and gets up from 700 to 900 ms."""
-    modes = {0: "stand", 100: "walk", 300: "stand", 500: "walk", 700: "rising", 900: "walk"}
+    """It walks from 100, stands from 300 to 500, and stands up from 700 to 900 ms."""
+    modes = {0: "stand", 100: "walk", 300: "stand", 500: "walk", 700: "standing-up", 900: "walk"}
     statuses = {"r1": [says(tick, mode) for tick, mode in modes.items()]}
     ticks = whole(10)
     plans, measured = ticks["team/r1/plan"], ticks["team/r1/measurement"]

@@ -153,10 +153,10 @@ def test_what_is_not_lockstep_or_not_used_is_refused(
     status, output = resim(capsys, path)
     assert (status, output.count("\n")) == (2, 1)
     assert "got a walk in real time, expected one in lock-step" in output
-    own = config(team__plant_per_robot=True, team__yokes="none")
+    own = config(team__plant="puppet")
     status, output = resim(capsys, write_lockstep(tmp_path / "own.mcap", own))
     assert status == 2
-    assert "team.plant_per_robot true, expected a walk in one simulated world" in output
+    assert "team.plant_per_robot false, expected a walk in one simulated world" in output
     assert main(["resim", str(whole), "--seed", "4"]) == 2
     assert "got --seed, expected an option that it has" in capsys.readouterr().err
     assert main(["resim", str(tmp_path / "none.mcap")]) == 2
