@@ -37,10 +37,6 @@ _BAD_ENDS: Final = {
         "a simulation that stays bounded",
         "gains, loads, pushes or faults that no simulation follows",
     ),
-    codes.CLOCK_SET: (
-        "a system clock that nobody sets during a walk",
-        "let PTP or chrony set it before; or the computer was suspended",
-    ),
     codes.COMMAND_LOST: (
         "commands of all robots until the end",
         "the agent failed, was stopped, or its computer is too slow: see what it says itself",
@@ -72,7 +68,7 @@ def run(
         ConfigError: the plant cannot be built from the configuration.
         BusError: the bus cannot be opened, or the team is not complete in time.
         ProcessError: another plant, an agent, or the link to the router vanished while the team
-            walked, or somebody set the system clock.
+            walked.
         KeyboardInterrupt: it is stopped before its plant is built.
     """
     stopped = stopped or stop_on_signals()

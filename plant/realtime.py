@@ -11,7 +11,6 @@ from quadriga.plant.pace import TeamPace
 from quadriga.plant.protocol import TOLD_TO_STOP, End
 from quadriga.plant.server import PlantServer
 from quadriga.plant.team_time import plant_gone
-from quadriga.shared import codes
 from quadriga.shared.bus.session import HERE
 from quadriga.shared.messages import Command
 from quadriga.shared.runtime.clock import Rate
@@ -44,7 +43,6 @@ def run_realtime(
         end = server.step(motors.commands())
         if server.plant.tick % PERIOD_MS == 0 or end is not None:
             status = motors.deadlines.status(server.plant.tick, rate.overruns)
-            status = status if pace is None else pace.describe(status)
             server.publish_status(server.plant.describe(status))
     code, detail = end or TOLD_TO_STOP
     late = motors.deadlines.describe_late()
@@ -64,10 +62,6 @@ def _check_others(server: PlantServer, pace: TeamPace | None) -> None:
     note = server.bus.standstill.note
     if behind := server.time.behind(server.plant.tick - round(1000 * timeout)):
         server.time.end = plant_gone(sorted(behind), f"silent for {timeout:g} s{note}")
-    if news := pace.news():
-        server.announce(codes.CLOCK_OFF, server.plant.names[0], news)
-    if (was_set := pace.look()) is not None:
-        server.end(was_set)
 
 
 class _Motors:

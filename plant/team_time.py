@@ -80,7 +80,7 @@ class LeadTime(TeamTime):
             return
         if event.robot not in self._others:
             return
-        if event.code in (codes.CLOCK_SET, codes.COMMAND_LOST):
+        if event.code == codes.COMMAND_LOST:
             self.end = self.end or End(event.code, event.detail)
         elif event.code in codes.DOWN:
             self.falls.append(event)

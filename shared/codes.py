@@ -51,8 +51,6 @@ STANDS_UP: Final = "stands-up"
 STANDS_AGAIN: Final = "stands-again"
 BRIDGE_MODE: Final = "bridge-mode"
 ROBOT_STOPPED: Final = "robot-stopped"
-CLOCK_OFF: Final = "clock-off"
-CLOCK_SET: Final = "clock-set"
 
 EVENTS: Final[Mapping[str, EventCode]] = MappingProxyType(
     {
@@ -83,7 +81,6 @@ EVENTS: Final[Mapping[str, EventCode]] = MappingProxyType(
             "bridge", "a bridge's robot begins to stand up, walk or lie down, or is hot"
         ),
         ROBOT_STOPPED: EventCode("fault", "a bridge has stopped its robot: damped, then passive"),
-        CLOCK_OFF: EventCode("fault", "a plant's system clock is off by more than 1 ms"),
         TIME_OVER: EventCode("stop", "the walk is over: world.duration have passed"),
         FALLEN: EventCode("stop", "the walk is over: a robot fell"),
         SIGNAL: EventCode("stop", "the walk is over: the world was told to stop"),
@@ -92,7 +89,6 @@ EVENTS: Final[Mapping[str, EventCode]] = MappingProxyType(
             "stop", "the walk is over: commands of a robot do not come any more"
         ),
         PLANT_GONE: EventCode("stop", "the walk is over: one of several plants left or is silent"),
-        CLOCK_SET: EventCode("stop", "the walk is over: somebody set a plant's system clock"),
         PLANT_FAILED: EventCode("stop", "the walk is over: the plant failed"),
         LINK_LOST: EventCode("stop", "the walk is over: the link to the router is gone"),
         LEAD_GONE: EventCode("stop", "who drives time vanished: as the recorder notes it"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from math import isnan
 from pathlib import Path
 from typing import Any, Final
@@ -202,26 +202,11 @@ def _deadlines(traces: Traces) -> dict[str, Any]:
             "late": late,
             "late_share": late / ticks if ticks else None,
             "held": sim_status.counters.get(f"{robot}.held", 0),
-            "damped": sim_status.counters.get(f"{robot}.damped", 0),
             "command_age_ms": _spread(sim_status, f"{robot}.command"),
             "deadlines_missed": own[-1].counters.get("deadlines_missed") if own else None,
             "jitter_ms": _spread(own[-1], "jitter") if own else {},
-            "clock": _clock(traces.plants[robot]),
         }
     return {"realtime": by_member}
-
-
-def _clock(statuses: Sequence[Status]) -> dict[str, Any] | None:
-    """By how much a plant's system clock was off for sure, ms; None of one that leads or is alone.
-
-    Of all comparisons it is that which shows most: whose offset exceeds its error by most.
-    """
-    ages = [status.ages_ms for status in statuses if "clock.offset" in status.ages_ms]
-    found = [(abs(age["clock.offset"]), age["clock.error"]) for age in ages]
-    if not found:
-        return None
-    offset, error = max(found, key=lambda pair: pair[0] - pair[1])
-    return {"offset_ms": offset, "error_ms": error}
 
 
 def _spread(status: Status, name: str) -> dict[str, float]:

@@ -77,12 +77,8 @@ def _list_lateness(realtime: Mapping[str, Any] | None) -> list[tuple[str, str]]:
         else:
             share = format_number(figures["late_share"], ".1f", 100)
             age = _format_spread("age", figures["command_age_ms"])
-            text = f"{share} % of commands, {figures['held']} held, {figures['damped']} damped; "
-            text += f"{age}; {jitter}"
+            text = f"{share} % of commands, {figures['held']} held; {age}; {jitter}"
         shown.append((f"{name} late", text))
-        if figures.get("clock"):
-            offset, error = figures["clock"]["offset_ms"], figures["clock"]["error_ms"]
-            shown.append((f"{name} clock", f"off by {offset:.2f} ± {error:.2f} ms"))
     return shown
 
 

@@ -10,7 +10,7 @@ from rich.console import Console
 from quadriga.recordings.summary import RECORDING, summarise
 from quadriga.recordings.summary_table import print_summary
 from quadriga.recordings.traces import read_traces
-from quadriga.shared.codes import CLOCK_SET, LEAD_GONE, LINK_LOST, PLANT_FAILED, PLANT_GONE, SIGNAL
+from quadriga.shared.codes import LEAD_GONE, LINK_LOST, PLANT_FAILED, PLANT_GONE, SIGNAL
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.modes import is_commanded
 from quadriga.shared.recording.reader import Recording
@@ -20,7 +20,6 @@ _CAUSES: Final = {
     "": "the sim server or its link failed",
     SIGNAL: "the sim server was told to stop",
     PLANT_GONE: "one robot's plant failed, left or fell silent",
-    CLOCK_SET: "somebody set the system clock of a plant's computer, or it was suspended",
     PLANT_FAILED: "the plant failed: its log tells why",
     LEAD_GONE: "who drives time was killed, failed or was cut off",
     LINK_LOST: "the router was killed or stopped, or the network failed",

@@ -9,13 +9,11 @@ from threading import Event, Thread
 from types import SimpleNamespace
 from typing import cast
 
-import numpy as np
 import pytest
 
 from quadriga.plant import pace as module
-from quadriga.plant.pace import SystemClock, TeamPace
-from quadriga.shared import codes
-from quadriga.shared.bus.diagnostics import ClockOffset, MemberAnswer
+from quadriga.plant.pace import TeamPace
+from quadriga.shared.bus.diagnostics import MemberAnswer
 from quadriga.shared.bus.discovery import join
 from quadriga.shared.bus.membership import members
 from quadriga.shared.bus.process_info import ProcessInfo
@@ -23,8 +21,7 @@ from quadriga.shared.bus.session import READY, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError
-from quadriga.shared.messages import Status
-from quadriga.shared.runtime.clock import monotonic_ns, sleep, wall_offset
+from quadriga.shared.runtime.clock import monotonic_ns, sleep
 from quadriga.team.endpoint import free_endpoint
 from tests.shared.bus.abouts import SIM, answer
 
@@ -37,28 +34,6 @@ def never() -> bool:
 
 def pause() -> None:
     sleep(0.002)
-
-
-@pytest.mark.parametrize(
-    ("change", "error", "set_by"),
-    [(900_000, 0, 0), (3 * MS, 0, 3 * MS), (-3600 * S, 0, -3600 * S), (3 * MS, 2 * MS, 0)],
-)
-def test_who_sets_the_system_clock_is_noticed_and_moves_no_tick(
-    change: int, error: int, set_by: int
-) -> None:
-    clock = SystemClock(50 * S)
-    before = clock.to_monotonic(60 * S)
-    clock.compare(50 * S + change, error)
-    assert clock.set_by == set_by
-    assert abs(clock.to_monotonic(60 * S) - before) <= 2000
-
-
-def test_a_clock_that_runs_otherwise_than_the_monotonic_one_is_followed() -> None:
-    clock = SystemClock(0)
-    for look in range(1000):  # 100 ppm, read every 10 ms
-        clock.compare(1000 * look, 500)
-    assert clock.set_by == 0
-    assert abs(clock.to_monotonic(0) + 1000 * 999) <= 1000
 
 
 @pytest.fixture
@@ -117,20 +92,13 @@ def test_both_begin_at_one_instant_and_keep_the_pace_of_the_system_clock(
         for _ in range(300):
             assert follows.wait() >= 0.0
         ended = monotonic_ns()
-        follows.offset = None  # as of before the walk
-        for _ in range(300):
-            follows.wait()
-            assert follows.look() is None
     finally:
         walked.set()
         thread.join()
     assert walking == {"leader": True, "follower": True}
-    first = leads._start - wall_offset()[0]
-    assert first - MS < begun, "none begins before T0"
-    assert ended > first + 299 * MS
-    assert (leads.offset, leads.look()) == (None, None)
-    assert follows.offset is not None, "they are compared while walking, too"
-    assert not follows.offset.exceeds(0.0), "here it is the same clock"
+    assert leads._start - MS < begun, "none begins before T0"
+    assert ended > leads._start + 299 * MS
+    assert abs(leads._start - follows._start) < MS, "here it is the same clock"
 
 
 def of_plant(config: Config, name: str) -> TeamPace:
@@ -149,7 +117,7 @@ def test_a_late_plant_catches_up_and_leaves_no_tick_out(
         now[0] += max(round(1e9 * seconds), 0)
 
     monkeypatch.setattr(module, "sleep", go_on)
-    pace._clock, pace._start, pace._begun = SystemClock(0), 100 * S, 100 * S
+    pace._start = pace._begun = 100 * S
     assert [pace.wait() for _ in range(3)] == [0.0, 0.0, 0.0]
     now[0] += 5 * MS
     late = [pace.wait() for _ in range(12)]
@@ -179,33 +147,6 @@ def test_a_clock_that_is_off_is_refused_and_the_remedy_named(
         of_plant(config, "plant_r2").check_clock()
     assert (raised.value.name, raised.value.got) == ("system clock of plant_r2", got)
     assert said is None or "PTP" in raised.value.cause
-
-
-def test_a_clock_that_drifts_off_while_walking_is_told_once(config: Config) -> None:
-    pace, news = of_plant(config, "plant_r2"), list[str]()
-    for ahead in (0.5e-3, 1.6e-3, 1.7e-3, 0.2e-3, -1.8e-3):
-        pace.offset = ClockOffset(ahead, 0.2e-3)
-        news.append(pace.news())
-    off = "its system clock is {} that of plant_r1"
-    assert news == ["", off.format("1.6 ms ahead of"), "", "", off.format("1.8 ms behind")]
-    described = pace.describe(Status(0, 0, "realtime", "", "", {}, {"ticks": 5}, *np.zeros((2, 0))))
-    assert described.ages_ms == {"clock.offset": pytest.approx(-1.8), "clock.error": 0.2}
-
-
-def test_a_clock_that_was_set_ends_the_walk(
-    config: Config, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    pace = of_plant(config, "plant_r1")
-    pace._clock = SystemClock(wall_offset()[0])
-    assert pace.look() is None
-    offset, error = wall_offset()
-    monkeypatch.setattr(module, "wall_offset", lambda: (offset + 5 * MS, error))
-    end = pace.look()
-    assert end is not None
-    assert (end.code, end.detail) == (
-        codes.CLOCK_SET,
-        "the system clock of plant_r1 was set by +5 ms",
-    )
 
 
 def test_who_is_told_to_stop_while_it_waits_stops(paces: dict[str, TeamPace]) -> None:

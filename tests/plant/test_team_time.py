@@ -78,13 +78,6 @@ def test_a_plant_is_silent_whose_newest_message_is_too_old(robot: str) -> None:
     assert time.behind(701) == {other}
 
 
-def test_all_leave_when_the_system_clock_of_one_was_set(config: Config) -> None:
-    lead = LeadTime(config, "r1")
-    lead.take(EVENT.key("team"), event(codes.CLOCK_SET, "r2", 5), 5)
-    assert lead.end is not None
-    assert lead.end.code == codes.CLOCK_SET
-
-
 def test_who_drives_time_ends_when_another_plant_is_gone(config: Config) -> None:
     lead = LeadTime(config, "r1")
     lead.look({"plant_r2", "plant_r3", "r1"})

@@ -16,7 +16,6 @@ from quadriga.recordings.summary import summarise
 from quadriga.recordings.summary_table import print_summary
 from quadriga.recordings.traces import ERRORS
 from quadriga.shared import messages as msg
-from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config, PlannerConfig
 from quadriga.shared.config.write import config_sha256
 from quadriga.shared.errors import RecordingError
@@ -339,24 +338,7 @@ def test_what_came_late_in_real_time(write_run: WriteRun) -> None:
     assert late["r1"]["deadlines_missed"] == 9
     assert late["r1"]["jitter_ms"] == {"max": 1.5}
     assert late["r2"]["late"] == 0
-    assert "5.0 % of commands, 7 held, 0 damped" in table(summary)
-
-
-def test_how_far_the_clocks_of_plants_of_their_own_were_off(write_run: WriteRun) -> None:
-    def status(tick: int, ages: dict[str, float]) -> msg.Status:
-        counted = {"ticks": tick, "overruns": 0}
-        return msg.Status(tick, 0, "walking", "", "", ages, counted, *np.zeros((2, 0)))
-
-    extra: list[tuple[str, msg.Message]] = [
-        ("team/plant_r1/status", status(2000, {})),
-        ("team/plant_r2/status", status(1000, {"clock.offset": -0.5, "clock.error": 0.2})),
-        ("team/plant_r2/status", status(2000, {"clock.offset": 0.7, "clock.error": 0.6})),
-    ]
-    each = {"team.plant_per_robot": True, "team.yokes": "none", "world.mode": "realtime"}
-    summary = summarise(write_run(load(None, {"team.robots": 2, **each}), extra=extra))
-    clocks = {robot: summary["realtime"][robot]["clock"] for robot in ("r1", "r2")}
-    assert clocks == {"r1": None, "r2": {"offset_ms": 0.5, "error_ms": 0.2}}
-    assert "off by 0.50 ± 0.20 ms" in table(summary)
+    assert "5.0 % of commands, 7 held;" in table(summary)
 
 
 def test_in_lock_step_nothing_is_late(known_run: Path) -> None:
