@@ -192,7 +192,7 @@ class CommandTimeout:
         age = self._age(command, tick)
         if age > (self._first_ms if command is None else self._lost_ms):
             return f"silent for {age} ms"
-        if self._held_ms > MOST_HELD_MS:
+        if self._held_ms > max(MOST_HELD_MS, self._lost_ms):
             return f"late for {self._held_ms} ms"
         return ""
 

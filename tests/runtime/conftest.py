@@ -109,7 +109,9 @@ def make_team(tmp_path: Path, request: pytest.FixtureRequest) -> Make:
             "planner.kind": "none",
             "bus.endpoint": free_endpoint(),
             "bus.barrier_timeout": WAIT,
-            "bus.clock_timeout": 5.0,  # a machine that runs other tests stalls
+            # A machine that runs other tests stalls.
+            "bus.clock_timeout": 5.0,
+            "world.command_damp_ms": 2000,
             "recorder.enabled": False,
             "runtime.check_cpu": False,  # robots that walk late will do
         }

@@ -32,7 +32,7 @@ def never() -> bool:
 
 @pytest.mark.parametrize("mode", ["lockstep", "realtime"])
 def test_a_frozen_robot_is_named_and_the_walk_ends(make_team: Make, mode: str) -> None:
-    team = make_team(world__mode=mode, world__duration=FOREVER, world__command_timeout=0.5)
+    team = make_team(world__mode=mode, world__duration=FOREVER, world__command_timeout=3.0)
     rows = [replace(row, grace=1.0 if row.name == "r2" else row.grace) for row in team.rows()]
     with launch.Launch(rows, team.folder / "logs") as running:
         team.await_log("sim", BEGUN)
