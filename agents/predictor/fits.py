@@ -1,139 +1,144 @@
-"""The fits of a team's G by name, all on scaled deviations of its episodes."""
+"""The fits of G by name, for a team of robots and for any other plant."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from quadriga.agents.predictor.episode import Y_SCALE, Episode, wrench_map
-from quadriga.agents.predictor.measured_response import fit_measured_response, read_pulse_responses
-from quadriga.agents.predictor.periodic import (
-    Walked,
-    draw_starts,
-    estimate_response,
-    fit_factors,
-    held_samples,
+from quadriga.agents.predictor.episode import (
+    Episode,
+    Layout,
+    as_signal,
+    check_episodes,
+    everyone,
+    wrench_map,
 )
+from quadriga.agents.predictor.measured_response import fit_measured_response, read_pulse_responses
+from quadriga.agents.predictor.periodic import fit_periodic
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
-from quadriga.agents.predictor.regression import Penalty, fit_blocks
-from quadriga.shared.errors import PredictorError
+from quadriga.agents.predictor.regression import (
+    hankel_rank,
+    normal_equations,
+    solve_pinv,
+    solve_ridge,
+    to_physical,
+)
+from quadriga.shared.errors import PredictorError, did_you_mean
 from quadriga.shared.robots.conventions import Array
-from quadriga.shared.topics import SAMPLE_MS
 
-_COMMANDED: Final = (1, 2, 5)  # vx, vy, wz: outputs whose base moves with the reference
-
-Fit = Callable[[Sequence[Episode], PredictorMeta], Predictor]
+KINDS: Final = ("pinv", "ridge", "periodic")
 
 
-def fit(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
+def fit(episodes: Sequence[Episode], meta: PredictorMeta, wrench: Array | None = None) -> Predictor:
     """The fit that `meta.kind` names.
 
-    Raises:
-        PredictorError: no data, too little, of another team, or a singular problem.
-    """
-    return FITS[meta.kind](episodes, meta)
+    - pinv: G = Y_f [U_p; Y_p; U_f]† (eq. 6).
+    - ridge: row i minimises ‖Y_f^i − Σ_j G_ij Z_j‖² + ridge · M · (‖G_ii‖² + w² Σ_{j≠i} ‖G_ij‖²)
+      with M columns: effects that the data do not clearly show are not attributed to the peers.
+      Without this weight the agents' best responses to each other's last plans diverge.
+    - periodic: a function of the phase in which no input acts backwards, see `periodic`; of a team
+      that of the gait, with peers by their net wrench. Measured responses stand for fitted ones if
+      there is a file of them.
 
-
-def fit_pinv(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
-    """G = Y_f [U_p; Y_p; U_f]† (eq. 6), through the Gram matrix.
-
-    Raises:
-        PredictorError: no data, too little, or of another team.
-    """
-    return _fit_one(episodes, replace(meta, kind="pinv", phases=1, ridge=0.0, block_weight=1.0))
-
-
-def fit_ridge(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
-    """Block-weighted ridge regression of G; with w = 1 the plain one.
-
-    Row i minimises ‖Y_f^i − Σ_j G_ij Z_j‖² + ridge · M · (‖G_ii‖² + w² Σ_{j≠i} ‖G_ij‖²) with M
-    columns: effects that the data do not clearly show are not attributed to the peers. Without this
-    weight the agents' best responses to each other's last plans diverge.
+    Args:
+        episodes: of the plant.
+        meta: what is fitted.
+        wrench: of `periodic`, from an agent's inputs to what they act by, (w, m); None: of the
+            robot.
 
     Raises:
-        PredictorError: no data, too little, of another team, or a singular problem.
-    """
-    return _fit_one(episodes, replace(meta, kind="ridge", phases=1))
-
-
-def _fit_one(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
-    check_episodes(episodes, meta)
-    signals = [np.concatenate(episode.scaled_deviations(), axis=1) for episode in episodes]
-    penalty = Penalty(meta.ridge, meta.block_weight)
-    return Predictor(meta, *fit_blocks(meta.kind, signals, meta.layout, penalty))
-
-
-def fit_periodic(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
-    """G as a function of the gait's phase, causal, with peers by their net wrench; see `periodic`.
-
-    If there is a file of measured responses, these stand for fitted ones.
-
-    Raises:
-        PredictorError: no data, too little, of another team, or a singular problem.
+        PredictorError: no data, too little, of another plant, or a singular problem.
         PredictorFileError: the file of measured responses cannot be read, or is another team's.
     """
-    check_episodes(episodes, meta)
-    walks, hold = scale_episodes(episodes, meta)
-    if meta.response:
-        h = fit_measured_response(read_pulse_responses(Path(meta.response)), meta)
+    layout = meta.layout
+    if meta.kind == "periodic":
+        check_episodes(episodes, layout)
+        B = wrench_map(meta.robot) if wrench is None else wrench
+        response = None
+        if meta.response:
+            response = fit_measured_response(read_pulse_responses(Path(meta.response)), meta)
+        factors = fit_periodic(episodes, layout, meta.period, B, response)
+        phases = max(1, meta.period.ticks // meta.period.sample)
+        return Predictor(replace(meta, phases=phases), factors)
+    regression = normal_equations(episodes, layout)
+    if meta.kind == "pinv":
+        meta = replace(meta, phases=1, ridge=0.0, block_weight=1.0)
+        x = solve_pinv(regression, layout)
     else:
-        step = float(np.diff(phase_angles(meta, 0, 2))[0] % (2.0 * np.pi))
-        h = estimate_response(walks, hold, meta.layout, step)
-    factors = fit_factors(walks, h, meta.layout, wrench_map(meta.robot))
-    phases = max(1, 2 * meta.stance_ms // SAMPLE_MS)
-    return Predictor(replace(meta, kind="periodic", phases=phases), factors)
+        meta = replace(meta, phases=1)
+        x = solve_ridge(regression, layout, meta.ridge, meta.block_weight)
+    return Predictor(meta, to_physical(x, layout)[None])
 
 
-FITS: Final[Mapping[str, Fit]] = {"pinv": fit_pinv, "ridge": fit_ridge, "periodic": fit_periodic}
+def fit_plant(
+    episodes: Sequence[Episode],
+    kind: str = "pinv",
+    T_ini: int = 4,
+    N: int = 30,
+    *,
+    ridge: float = 1e-6,
+    block_weight: float = 1.0,
+    period: int = 1,
+    input_map: ArrayLike | None = None,
+) -> Predictor:
+    """Fit a predictor of any plant.
 
+    Signals are scaled by their root mean square before they are fitted, so that a ridge means the
+    same for every plant.
 
-def scale_episodes(
-    episodes: Sequence[Episode], meta: PredictorMeta
-) -> tuple[tuple[Walked, ...], int]:
-    """The episodes scaled, by net wrenches, and for how many samples their forces are held."""
-    hold = held_samples([episode.deviations()[0] for episode in episodes])
-    walked = []
-    for episode in episodes:
-        du, dy = episode.deviations()
-        base = (episode.y_base / Y_SCALE)[..., list(_COMMANDED)]
-        angle = phase_angles(meta, episode.first_tick, episode.samples)
-        w = du @ wrench_map(meta.robot).T
-        walked.append(Walked(w, dy / Y_SCALE, base, angle, draw_starts(du, hold)))
-    return tuple(walked), hold
-
-
-def phase_angles(meta: PredictorMeta, first_tick: int, count: int) -> Array:
-    """Angle of the gait's phase at the starts of samples, the first of which ends at `first_tick`.
-
-    Shape (count,), rad; 0 where the gait begins (`PredictorMeta.stand_ms`).
-    """
-    starts = first_tick + SAMPLE_MS * (np.arange(count) - 1) - meta.stand_ms
-    period = 2 * meta.stance_ms
-    angles: Array = 2.0 * np.pi * (starts % period) / period
-    return angles
-
-
-def check_episodes(episodes: Sequence[Episode], meta: PredictorMeta) -> None:
-    """Refuse data that no fit for `meta` can use.
+    Args:
+        episodes: of the plant, see `Episode.of`.
+        kind: one of `KINDS`, see `fit`.
+        T_ini: samples of the past that tell the plant's state: at least its lag.
+        N: samples to predict.
+        ridge: penalty per window on scaled columns, of `ridge`.
+        block_weight: of `ridge` and several agents: the penalty on what one does to another is this
+            squared times as large.
+        period: of `periodic`: samples after which the plant repeats itself.
+        input_map: of `periodic`: what the inputs of an agent act by, shape (w, m), such as the net
+            wrench of forces; the identity if left out.
 
     Raises:
-        PredictorError: no data, too little, or of another team.
+        PredictorError: an unknown kind, too little data, or inputs that do not excite the plant.
     """
+    if kind not in KINDS:
+        raise PredictorError("kind", repr(kind), ", ".join(KINDS), did_you_mean(kind, KINDS))
+    if (period > 1) != (kind == "periodic"):
+        raise PredictorError("period", f"{period} of {kind!r}", "above 1 of 'periodic', else 1")
+    if not (T_ini >= 1 and N >= 1 and ridge >= 0.0 and block_weight > 0.0):
+        got = f"{T_ini}, {N}, {ridge:g}, {block_weight:g}"
+        raise PredictorError("T_ini, N, ridge, block_weight", got, "numbers above 0")
     if not episodes:
-        raise PredictorError("episodes", "none", "at least one", "did every walk end in a fall?")
-    for episode in episodes:
-        if episode.robots != meta.robots:
+        raise PredictorError("episodes", "none", "at least one")
+    n, m, p = *episodes[0].u.shape[1:], episodes[0].y.shape[2]
+    B = np.eye(m) if input_map is None else as_signal("input_map", input_map)[:, 0]
+    if B.shape[1] != m:
+        raise PredictorError("input_map", f"shape {B.shape}", f"(w, {m})")
+    check_episodes(episodes, Layout(n, m, p, T_ini, N, (1.0,) * m, (1.0,) * p, everyone(n)))
+    inputs = [episode.deviations()[0] for episode in episodes]
+    scales = _sizes(inputs), _sizes([episode.deviations()[1] for episode in episodes])
+    layout = Layout(n, m, p, T_ini, N, *scales, everyone(n))
+    meta = PredictorMeta(n, N, T_ini, kind, period, ridge, block_weight, plant=layout)
+    if kind == "pinv" or ridge == 0.0:
+        scaled = [episode.scaled_deviations(layout)[0] for episode in episodes]
+        rank, full = hankel_rank(scaled, T_ini + N), n * m * (T_ini + N)
+        if rank < full:
             raise PredictorError(
-                "episode", f"{episode.robots} robots", f"{meta.robots}", "data of another team"
+                "inputs",
+                f"a Hankel matrix of rank {rank}",
+                f"rank {full}: persistently exciting of order {T_ini + N}",
+                "too little data, or an input that hardly varies",
             )
-        if episode.samples < meta.T_ini + meta.N:
-            raise PredictorError(
-                "episode",
-                f"{episode.samples} samples",
-                f"at least {meta.T_ini + meta.N}",
-                "cut short by a fall",
-            )
+    return fit(episodes, meta, B / np.array(_sizes([u @ B.T for u in inputs]))[:, None])
+
+
+def _sizes(signals: Sequence[Array]) -> tuple[float, ...]:
+    """Root mean squares of the components of signals (T, n, dim); 1 where one is always zero."""
+    squares = np.concatenate([signal.reshape(-1, signal.shape[2]) for signal in signals]) ** 2
+    sizes = np.sqrt(squares.mean(axis=0))
+    return tuple(np.where(sizes > 0.0, sizes, 1.0).tolist())

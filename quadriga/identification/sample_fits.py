@@ -9,9 +9,9 @@ from typing import Final
 import numpy as np
 
 from quadriga.agents.gait import nominal_forces, scheduled_stance
-from quadriga.agents.planner.acceptance import run_gates
 from quadriga.agents.predictor.episode import U_SCALE, Y_SCALE, Episode
-from quadriga.agents.predictor.fits import FITS, fit
+from quadriga.agents.predictor.fits import KINDS, fit
+from quadriga.agents.predictor.gates import coupling_table, run_gates
 from quadriga.agents.predictor.predictor import PredictorMeta
 from quadriga.agents.time_grid import sample_starts
 from quadriga.identification.behaviour import numbers
@@ -31,7 +31,7 @@ def samples() -> Iterator[Array]:
     use_one_blas_thread()
     config = load(None, _KEYS)
     first, second, held_out = (linear_episode(config, _SAMPLES, seed) for seed in range(3))
-    for kind in FITS:
+    for kind in KINDS:
         for neighbours in ("all", "yoked"):
             chosen = replace(config.identification, predictor=kind, neighbours=neighbours)
             of_kind = replace(config, identification=chosen)
@@ -40,7 +40,7 @@ def samples() -> Iterator[Array]:
             gates = run_gates(of_kind, predictor, (held_out,))
             # Not the condition: its last bit depends on where in memory the arrays lie.
             yield numbers(gates.error, gates.radius)
-            yield from (np.array(gates.gains), np.array(gates.coupling))
+            yield from (np.array(gates.gains), coupling_table(predictor))
             if gates.peers is not None:
                 slopes, harms = gates.peers.slope.values(), gates.peers.harm.values()
                 yield from (numbers(*bounds) for bounds in (*slopes, *harms))

@@ -11,11 +11,9 @@ from rich.console import Console
 
 from quadriga.agents.predictor.measured_response import (
     PulseResponses,
-    plant_of,
-    team_of,
+    measured_team,
     write_pulse_responses,
 )
-from quadriga.agents.predictor.predictor import PredictorMeta
 from quadriga.experiments.probe.cache import ensure_responses
 from quadriga.experiments.probe.outcome import ProbeOutcome, build_outcome
 from quadriga.experiments.probe.probe_figure import draw_probe
@@ -56,7 +54,7 @@ def write_outcome(outcome: ProbeOutcome, folder: Path) -> None:
     """Write a probe's figures as JSON, its tables as Markdown, its picture and the responses."""
     write_json(folder / FIGURES, outcome.to_dict())
     measured = outcome.responses
-    team = team_of(PredictorMeta.of(outcome.config)) | plant_of(outcome.config)
+    team = measured_team(outcome.config)
     truth = PulseResponses(measured.ticks, measured.u, measured.y, team)
     write_pulse_responses(folder / RESPONSES, truth)
     draw_probe(outcome, folder / _PICTURE)

@@ -12,10 +12,9 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from quadriga.agents.planner.acceptance import load_checked
 from quadriga.agents.predictor.episode import SIGNALS
+from quadriga.agents.predictor.gates import load_checked, read
 from quadriga.agents.predictor.hankel import required_samples
-from quadriga.agents.predictor.store import read
 from quadriga.identification import predictors
 from quadriga.identification.cache import data_path, predictor_path
 from quadriga.identification.dataset import Dataset, check_excitation, read_data, write_data
@@ -185,24 +184,23 @@ def permissive(**changes: Any) -> Config:
 
 
 def test_an_accepted_fit_says_what_it_was_accepted_with(team: Dataset, tmp_path: Path) -> None:
-    digest, report = fit(permissive(), team, tmp_path / "p.npz", silent())
+    report = fit(permissive(), team, tmp_path / "p.npz")[1].gates
     assert report.error < 0.01
     np.testing.assert_allclose(report.gains, 1.0, atol=0.05)
     assert 0.0 < report.radius < 10.0
     _, provenance = read(tmp_path / "p.npz")
     assert provenance.gates == report
-    assert len(digest) == 64
 
 
 def refused(config: Config, dataset: Dataset, path: Path) -> PredictorError:
     with pytest.raises(PredictorError) as caught:
-        fit(config, dataset, path, silent())
+        fit(config, dataset, path)[1].gates.check(config)
     assert not path.exists()
     return caught.value
 
 
 def test_diverging_best_responses_are_refused(team: Dataset, tmp_path: Path) -> None:
-    _, report = fit(permissive(), team, tmp_path / "p.npz", silent())
+    report = fit(permissive(), team, tmp_path / "p.npz")[1].gates
     config = permissive(max_radius=0.9 * report.radius)
     error = refused(config, team, tmp_path / "q.npz")
     assert "radius" in error.name
