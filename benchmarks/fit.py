@@ -23,8 +23,7 @@ import numpy as np
 
 from benchmarks.children import result_of
 from quadriga.agents.predictor.episode import Episode
-from quadriga.agents.predictor.fits import KINDS, fit
-from quadriga.agents.predictor.predictor import PredictorMeta
+from quadriga.agents.predictor.predictor import KINDS, PredictorMeta, fit
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robots.conventions import N_FORCES, N_OUTPUTS
 from quadriga.shared.runtime.clock import monotonic

@@ -7,7 +7,7 @@ The radius of the iteration of plans is one of the planner's own QPs.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -50,31 +50,11 @@ _MATCHED: Final = (
 
 
 class Bounds(NamedTuple):
-    """An estimate with its 95 % interval; None where the data do not tell."""
+    """An estimate with its 95 % interval."""
 
-    value: float | None
-    low: float | None
-    high: float | None
-
-
-@dataclass(frozen=True, slots=True)
-class PeersFigures:
-    """The predicted effect of the peers' forces by output, in held-out windows of all robots.
-
-    With p the part of a prediction that is due to the peers' forces within the horizon, and r what
-    is measured less all other parts of the prediction. The forces of the data are random and
-    independent of each other, so p explains as much of r as the peers really do.
-
-    Attributes:
-        share: norm of p for one peer over that of the part due to the robot's own forces.
-        slope: Σ p r / Σ p²: 1 if the peers do what is predicted, 0 if p is invented, more than 1 if
-            p is too small. Below 0.5 predictions are better without p.
-        harm: (‖r − p‖² − ‖r‖²) / ‖r‖²: how much p raises the squared error; negative if it helps.
-    """
-
-    share: Mapping[str, float | None]
-    slope: Mapping[str, Bounds]
-    harm: Mapping[str, Bounds]
+    value: float
+    low: float
+    high: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,8 +72,10 @@ class GateReport:
             patterns and phases.
         cost: that the agents minimise: "own", then the plans are best responses; "team".
         cost_probes: tell the QPs that the radius was computed for.
-        peers: what it says of the effect of peers' forces, against held-out data; None of a single
-            robot.
+        harm: by output, (‖r − p‖² − ‖r‖²) / ‖r‖² on held-out data, where p is the part of a
+            prediction that is due to the peers' forces within the horizon, and r what is measured
+            less all other parts: how much p raises the squared error, negative if it helps. Empty
+            of a single robot, and of less than 1.5 s held out, which tell no interval.
     """
 
     windows: int
@@ -104,7 +86,7 @@ class GateReport:
     radius: float
     cost: str = OWN
     cost_probes: tuple[float, ...] = ()
-    peers: PeersFigures | None = None
+    harm: Mapping[str, Bounds] = field(default_factory=dict)
 
     @property
     def iteration(self) -> str:
@@ -161,11 +143,11 @@ class GateReport:
                 f"below {self.radius_limit(config):g}",
                 f"the agents' plans would diverge; {remedy}",
             )
-        for output, (harm, least, _) in self.peers.harm.items() if self.peers else ():
-            if harm is not None and least is not None and least > limits.max_peers_harm:
+        for output, harm in self.harm.items():
+            if harm.low > limits.max_peers_harm:
                 raise PredictorError(
                     f"predictor: effect of peers on {output}",
-                    f"{100 * harm:.0f} % more squared error on held-out data than without it",
+                    f"{100 * harm.value:.0f} % more squared error on held-out data than without it",
                     f"certainly at most {100 * limits.max_peers_harm:g} %",
                     "invented from noise: more data, or a larger identification.block_weight",
                 )
@@ -202,18 +184,14 @@ class Provenance:
         """
         gates: dict[str, Any] = dict(body["gates"])
         gates["gains"] = tuple(tuple(row) for row in gates["gains"])
-        if gates["peers"] is not None:
-            peers = _fields_of(PeersFigures, gates["peers"])
-            for name in ("slope", "harm"):
-                peers[name] = {output: Bounds(*three) for output, three in peers[name].items()}
-            gates["peers"] = PeersFigures(**peers)
+        gates["harm"] = {name: Bounds(*three) for name, three in gates.get("harm", {}).items()}
         report = GateReport(**_fields_of(GateReport, gates))
         return cls(**_fields_of(cls, {**body, "gates": report}))
 
 
 def _fields_of(kind: type[Any], body: Mapping[str, Any]) -> dict[str, Any]:
     """The entries that a dataclass has fields for, lists as tuples."""
-    names = {field.name for field in fields(kind)}
+    names = {each.name for each in fields(kind)}
     return {k: tuple(v) if isinstance(v, list) else v for k, v in body.items() if k in names}
 
 
@@ -314,7 +292,7 @@ def run_gates(config: Config, predictor: Predictor, held_out: Sequence[Episode])
         radius=iteration_radius(config, predictor),
         cost=cost_of(config),
         cost_probes=probe_costs(config, predictor),
-        peers=peers_figures(predictor, held_out),
+        harm=peers_harm(predictor, held_out),
     )
 
 
@@ -465,86 +443,44 @@ def coupling_table(predictor: Predictor) -> Array:
 # ---- effect of peers
 
 
-def peers_figures(predictor: Predictor, held_out: Sequence[Episode]) -> PeersFigures | None:
-    """Figures of the predicted effect of the peers' forces; None for a single robot.
+def peers_harm(predictor: Predictor, held_out: Sequence[Episode]) -> dict[str, Bounds]:
+    """How much the predicted effect of the peers' forces raises the squared error, by output.
 
-    No walk is needed twice, so data of real robots will do.
-
-    Args:
-        predictor: whose predictions they are of.
-        held_out: episodes whose forces have random parts, independent between robots.
+    The forces of the data are random and independent between robots, so that no walk is needed
+    twice, and data of real robots will do. Sums over blocks of windows; the interval is that of the
+    delta method for a ratio of such sums, with Student's t (Cochran, Sampling Techniques, 3rd ed.,
+    section 6.3).
     """
-    n = predictor.layout.agents
-    if n == 1:
-        return None
-    blocks = np.array([block for one in held_out for block in _block_sums(predictor, one)])
-    pp, pr, rr, own = np.moveaxis(blocks, 1, 0)  # each of shape (blocks, 6)
-    alone, nothing = (n - 1) * own.sum(axis=0), np.full(len(OUTPUTS), np.nan)
-    share = np.sqrt(np.divide(pp.sum(axis=0), alone, out=nothing, where=alone > 0.0)).tolist()
-    return PeersFigures(
-        {name: s if np.isfinite(s) else None for name, s in zip(OUTPUTS, share, strict=True)},
-        dict(zip(OUTPUTS, _ratios(pr, pp), strict=True)),
-        dict(zip(OUTPUTS, _ratios(pp - 2.0 * pr, rr), strict=True)),
-    )
+    layout, blocks = predictor.layout, []
+    if layout.agents == 1:
+        return {}
+    for _, phases, z, dy in _windows(predictor, held_out):
+        peers = _peers_part(predictor, phases, z[:, layout.past :])
+        error = dy - _predict(predictor, phases, z)
+        squares = np.array([error**2, (error + peers) ** 2])
+        by_window = squares.reshape(2, layout.agents, layout.N, layout.outputs, -1).sum(axis=(1, 2))
+        count = max(1, round(len(phases) / _BLOCK))
+        blocks += [part.sum(axis=2) for part in np.array_split(by_window, count, axis=2)]
+    F = len(blocks)
+    if F < 2:
+        return {}
+    whole, without = np.moveaxis(np.array(blocks), 1, 0)  # each of shape (F, 6)
+    more, total = whole - without, without.sum(axis=0)
+    ratio = more.sum(axis=0) / total
+    spread = ((more - ratio * without) ** 2).sum(axis=0) * F / (F - 1)
+    reach = stdtrit(F - 1, _TAIL) * np.sqrt(spread) / total
+    rows = np.stack([ratio, ratio - reach, ratio + reach], axis=1).tolist()
+    return {name: Bounds(*row) for name, row in zip(OUTPUTS, rows, strict=True)}
 
 
-def _block_sums(predictor: Predictor, episode: Episode) -> Iterable[Array]:
-    """Σ p², Σ p r, Σ r² and Σ (own part)² over each block of windows. Shape (4, 6)."""
-    layout = predictor.layout
-    for _, phases, z, dy in _windows(predictor, [episode]):
-        own, peers = _parts(predictor, phases, z[:, layout.past :])
-        rest = dy - _predict(predictor, phases, z) + peers
-        products = (peers**2, peers * rest, rest**2, own**2)
-        shape = (layout.agents, layout.N, layout.outputs, -1)
-        by_window = np.array([x.reshape(shape).sum(axis=(0, 1)) for x in products])
-        count = max(1, round(z.shape[2] / _BLOCK))
-        yield from (part.sum(axis=2) for part in np.array_split(by_window, count, axis=2))
-
-
-def _parts(predictor: Predictor, phases: NDArray[np.int64], u: Array) -> tuple[Array, Array]:
-    """Parts of predictions due to a robot's own forces and to its peers', (n, 6 N, C) each.
-
-    Args:
-        predictor: of the team.
-        phases: of each window, shape (C,).
-        u: forces of the horizon, shape (n, 12 N, C).
-    """
-    n, _, windows = u.shape
-    own = np.zeros((n, predictor.layout.rows, windows))
-    peers = np.zeros_like(own)
+def _peers_part(predictor: Predictor, phases: NDArray[np.int64], u: Array) -> Array:
+    """Part of predictions due to the peers' forces u of the horizon, (n, 12 N, C). (n, 6 N, C)."""
+    agents, peers = range(len(u)), np.zeros((len(u), predictor.layout.rows, u.shape[2]))
     for phase in np.unique(phases):
         now = phases == phase
-        for i in range(n):
-            for j in range(n):
-                part = predictor.future_block(i, j, int(phase)) @ u[j][:, now]
-                (own if i == j else peers)[i][:, now] += part
-    return own, peers
-
-
-def _ratios(over: Array, under: Array) -> list[Bounds]:
-    """Σ over / Σ under of each output, its interval from how much the blocks differ.
-
-    The delta method for a ratio of sums over blocks, with Student's t (Cochran, Sampling
-    Techniques, 3rd ed., section 6.3).
-
-    Args:
-        over: shape (blocks, 6).
-        under: likewise, not negative.
-    """
-    count, total = len(over), under.sum(axis=0)
-    bounds = []
-    for k, whole in enumerate(total):
-        if not whole > 0.0:
-            bounds.append(Bounds(None, None, None))
-            continue
-        ratio = float(over[:, k].sum() / whole)
-        if count < 2:
-            bounds.append(Bounds(ratio, None, None))
-            continue
-        spread = ((over[:, k] - ratio * under[:, k]) ** 2).sum() * count / (count - 1)
-        reach = float(stdtrit(count - 1, _TAIL) * np.sqrt(spread) / whole)
-        bounds.append(Bounds(ratio, ratio - reach, ratio + reach))
-    return bounds
+        for i, j in ((i, j) for i in agents for j in agents if i != j):
+            peers[i][:, now] += predictor.future_block(i, j, int(phase)) @ u[j][:, now]
+    return peers
 
 
 # ---- whether the iteration of the agents' plans converges

@@ -88,12 +88,7 @@ class Period:
 def harmonics(angle: Array, order: int) -> Array:
     """1, √2 cos θ, √2 sin θ, …, √2 cos kθ, √2 sin kθ up to k = `order`: orthonormal over a period.
 
-    Args:
-        angle: θ, the phase as an angle, any shape, rad.
-        order: of the highest harmonic.
-
-    Returns:
-        Shape (*angle.shape, 2 order + 1).
+    Shape (*angle.shape, 2 order + 1).
     """
     k = np.arange(1, order + 1) * angle[..., None]
     waves = np.sqrt(2.0) * np.stack([np.cos(k), np.sin(k)], axis=-1)
@@ -106,10 +101,6 @@ def polynomials(angle: Array, degree: int) -> Array:
     """Legendre polynomials in each half of the period, orthonormal over the period.
 
     Other feet stand in the other half: what a force does jumps from one half to the other.
-
-    Args:
-        angle: θ, the phase as an angle, any shape, rad.
-        degree: of the highest polynomial.
 
     Returns:
         Shape (*angle.shape, 2 degree + 2): those of the first half, then those of the second; each
@@ -243,22 +234,13 @@ def fit_periodic(
 
 
 class _Walk(NamedTuple):
-    """One episode as the regressions see it, scaled.
+    """One episode as the regressions see it, scaled."""
 
-    Attributes:
-        w: what the inputs act by, a team's net wrenches, (T, n, w).
-        y: outputs, (T, n, p).
-        base: commanded outputs, (T, n, c).
-        angle: of the phase in the period at the sample's start, (T,), rad.
-        starts: samples with which a new draw of the inputs' noise begins, in order; none in an
-            episode without noise.
-    """
-
-    w: Array
-    y: Array
-    base: Array
-    angle: Array
-    starts: Index
+    w: Array  # what the inputs act by, a team's net wrenches, (T, n, w)
+    y: Array  # outputs, (T, n, p)
+    base: Array  # commanded outputs, (T, n, c)
+    angle: Array  # of the phase in the period at the sample's start, (T,), rad
+    starts: Index  # samples with which a new draw of the inputs' noise begins; none without noise
 
 
 def held_samples(inputs: Sequence[Array]) -> int:
@@ -303,12 +285,6 @@ def _forced(walk: _Walk, at: Index, degree: int) -> Array:
     return (values[:, :, None] * w[:, None, :]).reshape(len(at), -1)
 
 
-def _outputs_of(walk: _Walk, at: Index) -> Array:
-    """Outputs of all agents at samples `at`. Shape (len(at), p n)."""
-    y: Array = walk.y[at].reshape(len(at), -1)
-    return y
-
-
 def _chunks(
     walks: Sequence[_Walk], first: int, ahead: int, size: int, *, starts: bool
 ) -> Iterator[tuple[_Walk, Index]]:
@@ -328,16 +304,12 @@ def _chunks(
 class _Sums(NamedTuple):
     """Sums over rows of a regression with K regressors z; the third is one of the fit at hand.
 
-    Attributes:
-        zz: Σ z zᵀ, (K, K).
-        zy: Σ z yᵀ for each lag: of responses (N, K, p n), of the map from the past (K, N, n, p).
-        third: of responses Σ z (later draw)ᵀ for each later draw, (draws, K, kw), kw being the
-            regressors of the pulse; of the map from the past Σ y² over all lags, (n, p).
-        rows: how many.
+    Of responses it is Σ z (later draw)ᵀ for each later draw, (draws, K, kw) with kw regressors of
+    the pulse; of the map from the past Σ y² over all lags, (n, p).
     """
 
-    zz: Array
-    zy: Array
+    zz: Array  # Σ z zᵀ, (K, K)
+    zy: Array  # Σ z yᵀ for each lag: of responses (N, K, p n), else (K, N, n, p)
     third: Array
     rows: int
 
@@ -353,9 +325,8 @@ def _each(operation: Callable[[Any, Any], Any], one: _Sums, other: _Sums) -> _Su
 #     y_{t+l} − Σ_s g_{l−s}(θ_{t+s}) w_{t+s} = g_l(θ_t) w_t + c_l z_t + e,   s = S, 2S, … ≤ l,
 #
 # with the later draws' responses subtracted as they are known from smaller lags. z_t holds what
-# came before t. The noise is drawn independently of all that, so g is unbiased whatever z_t leaves
-# out; what z_t explains only lowers the variance. All lags have the same regressors: one
-# factorisation.
+# came before t; draws are independent of it, so that it only lowers the variance of g. All lags
+# have the same regressors: one factorisation.
 
 
 def estimate_response(
@@ -411,15 +382,12 @@ def _sum_response_rows(walk: _Walk, at: Index, N: int, hold: int) -> _Sums:
     later = [_forced(walk, at + s, DEGREE) for s in range(hold, N, hold)]
     kw = pulse.shape[1]
     zw = np.stack([z.T @ w for w in later]) if later else np.zeros((0, z.shape[1], kw))
-    zy = np.stack([z.T @ _outputs_of(walk, at + lag) for lag in range(N)])
+    zy = np.stack([z.T @ walk.y[at + lag].reshape(len(at), -1) for lag in range(N)])
     return _Sums(z.T @ z, zy, zw, len(at))
 
 
 def _solve_lags(sums: _Sums, n: int, hold: int) -> Array:
-    """Coefficients of the responses g to a held draw. Shape (2 DEGREE + 2, N, n, w, n, p).
-
-    Axes: polynomial, lag, agent that pushes, component, agent that responds, output.
-    """
+    """Coefficients of the responses g to a held draw. Shape (2 DEGREE + 2, N, n, w, n, p)."""
     N, K, outputs = sums.zy.shape
     kw = sums.third.shape[2]
     penalised = sums.zz.copy(order="F")
@@ -462,9 +430,8 @@ def spread_over_samples(g: Array, hold: int, angle_step: float) -> Array:
 # ---- which responses of peers are real
 #
 # Every fold of the data gives an estimate of its own (by the jackknife). Products of the estimates
-# of two different folds have the square of the true response as their mean, so they tell a response
-# from noise without knowing the noise; how far the folds scatter tells how much of a response's
-# square is noise.
+# of two folds have the square of the true response as their mean, whatever the noise; how far the
+# folds scatter tells how much of a response's square is noise.
 
 
 def shrink(estimate: Array, without: Array) -> tuple[Array, NDArray[np.bool_]]:
@@ -512,19 +479,12 @@ def _is_significant(folds: Array) -> NDArray[np.bool_]:
 
 # ---- what follows from the past
 #
-# What the inputs of the horizon do is subtracted first, by the responses already known. The
-# penalties are chosen for each output by the error on the last part of the data, from a fit to the
-# rest.
+# What the inputs of the horizon do is subtracted first. The penalties are chosen for each output by
+# the error on the last part of the data, from a fit to the rest.
 
 
 def fit_free(walks: Sequence[_Walk], h: Array, layout: Layout) -> Array:
-    """The map as harmonics. Shape (2 FREE_ORDER + 1, n responding, n, p N, (w + p) T_ini).
-
-    Args:
-        walks: scaled episodes.
-        h: coefficients of the response to a sample's w, (k, N, n, w, n, p).
-        layout: whose past may matter to whom.
-    """
+    """The map as harmonics. Shape (2 FREE_ORDER + 1, n responding, n, p N, (w + p) T_ini)."""
     train, rest = _sum_free_parts(walks, h, layout.T_ini)
     both = _each(operator.add, train, rest)
     waves, (_, N, n, w, _, p) = 2 * FREE_ORDER + 1, h.shape
@@ -560,7 +520,7 @@ def _sum_free_parts(walks: Sequence[_Walk], h: Array, T_ini: int) -> tuple[_Sums
     for walk, at in _chunks(walks, T_ini, N, _FREE_ROWS, starts=False):
         past, waves = _past_rows(walk, at, T_ini), harmonics(walk.angle[at], FREE_ORDER)
         z = (waves[:, :, None] * past[:, None, :]).reshape(len(at), -1)
-        y = np.stack([_outputs_of(walk, at + lag) for lag in range(N)], axis=1)
+        y = np.stack([walk.y[at + lag].reshape(len(at), -1) for lag in range(N)], axis=1)
         y = (y - _forced_outputs(walk, at, h)).reshape(len(at), -1)
         yy = (y**2).sum(axis=0).reshape(N, n, p).sum(axis=0)
         here = _Sums(z.T @ z, (z.T @ y).reshape(K, N, n, p), yy, len(at))

@@ -1,24 +1,48 @@
-"""G, the data-driven state-transition matrix over N steps (eq. 6), and its blocks (eq. 9)."""
+"""G, the data-driven state-transition matrix over N steps (eq. 6), its blocks (eq. 9), its fits."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from quadriga.agents.predictor.episode import Layout, as_signal, everyone, team_layout
-from quadriga.agents.predictor.periodic import Period, PeriodicFactors
+from quadriga.agents.predictor.episode import (
+    Episode,
+    Layout,
+    as_signal,
+    check_episodes,
+    everyone,
+    team_layout,
+    wrench_map,
+)
+from quadriga.agents.predictor.measured_response import fit_measured_response, read_pulse_responses
+from quadriga.agents.predictor.periodic import Period, PeriodicFactors, fit_periodic
+from quadriga.agents.predictor.regression import (
+    hankel_rank,
+    normal_equations,
+    solve_pinv,
+    solve_ridge,
+    to_physical,
+)
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.yokes import neighbours
-from quadriga.shared.errors import PredictorError
+from quadriga.shared.errors import PredictorError, did_you_mean
 from quadriga.shared.robots.conventions import Array
 from quadriga.shared.topics import SAMPLE_MS
 
+KINDS: Final = ("pinv", "ridge", "periodic")  # of fits
 # Keys of the controller that act only in a failure and do not change the plant that is fitted.
 _SAFETY_KEYS: Final = ("damping", "fall_tilt", "max_failures")
+_KEYS: Final = {
+    "team": ("robots", "robot", "yokes", "alternate_phase"),
+    "planner": ("N", "T_ini", "interface"),
+    "gait": ("stance_ms", "stand_ms"),
+    "identification": ("neighbours", "ridge", "block_weight"),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +50,7 @@ class PredictorMeta:
     """The team and settings that a predictor was fitted for, and how; it fits no others.
 
     Attributes:
-        kind: name of the fit, one of `quadriga.agents.predictor.fits.KINDS`.
+        kind: name of the fit, one of `KINDS`.
         phases: parts of the period with a G of their own (see `time_grid.gait_phase`).
         neighbours: "all", or "yoked": G_ij is zero unless i and j are yoked.
         controller: the low level, which is part of G.
@@ -56,25 +80,18 @@ class PredictorMeta:
     @classmethod
     def of(cls, config: Config) -> PredictorMeta:
         """The meta of a predictor fitted for `config`."""
+        known: dict[str, Any] = {
+            key: getattr(getattr(config, section), key)
+            for section, keys in _KEYS.items()
+            for key in keys
+        }
         controller = {k: v for k, v in asdict(config.controller).items() if k not in _SAFETY_KEYS}
-        ident = config.identification
         return cls(
-            robots=config.team.robots,
-            robot=config.team.robot,
-            N=config.planner.N,
-            T_ini=config.planner.T_ini,
-            interface=config.planner.interface,
-            yokes=config.team.yokes,
-            alternate_phase=config.team.alternate_phase,
-            stance_ms=config.gait.stance_ms,
-            stand_ms=config.gait.stand_ms,
-            controller=tuple(sorted(controller.items())),
-            kind=ident.predictor,
+            kind=config.identification.predictor,
             phases=1,
-            neighbours=ident.neighbours,
-            ridge=ident.ridge,
-            block_weight=ident.block_weight,
+            controller=tuple(sorted(controller.items())),
             response=config.response_file,
+            **known,
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -258,3 +275,117 @@ def check_sizes(config: Config, predictor: Predictor) -> None:
         raise PredictorError(
             "predictor", f"(robots, N, T_ini) = {got}", f"{expected}", "of another team?"
         )
+
+
+# ---- fits
+
+
+def fit(episodes: Sequence[Episode], meta: PredictorMeta, wrench: Array | None = None) -> Predictor:
+    """The fit that `meta.kind` names.
+
+    - pinv: G = Y_f [U_p; Y_p; U_f]† (eq. 6).
+    - ridge: row i minimises ‖Y_f^i − Σ_j G_ij Z_j‖² + ridge · M · (‖G_ii‖² + w² Σ_{j≠i} ‖G_ij‖²)
+      with M columns: effects that the data do not clearly show are not attributed to the peers.
+      Without this weight the agents' best responses to each other's last plans diverge.
+    - periodic: a function of the phase in which no input acts backwards, see `periodic`; of a team
+      that of the gait, with peers by their net wrench. Measured responses stand for fitted ones if
+      there is a file of them.
+
+    Args:
+        episodes: of the plant.
+        meta: what is fitted.
+        wrench: of `periodic`, from an agent's inputs to what they act by, (w, m); None: of the
+            robot.
+
+    Raises:
+        PredictorError: no data, too little, of another plant, or a singular problem.
+        PredictorFileError: the file of measured responses cannot be read, or is another team's.
+    """
+    layout = meta.layout
+    if meta.kind == "periodic":
+        check_episodes(episodes, layout)
+        B = wrench_map(meta.robot) if wrench is None else wrench
+        response = None
+        if meta.response:
+            measured = read_pulse_responses(Path(meta.response))
+            response = fit_measured_response(measured, layout, meta.period, B)
+        factors = fit_periodic(episodes, layout, meta.period, B, response)
+        phases = max(1, meta.period.ticks // meta.period.sample)
+        return Predictor(replace(meta, phases=phases), factors)
+    regression = normal_equations(episodes, layout)
+    if meta.kind == "pinv":
+        meta = replace(meta, phases=1, ridge=0.0, block_weight=1.0)
+        x = solve_pinv(regression, layout)
+    else:
+        meta = replace(meta, phases=1)
+        x = solve_ridge(regression, layout, meta.ridge, meta.block_weight)
+    return Predictor(meta, to_physical(x, layout)[None])
+
+
+def fit_plant(
+    episodes: Sequence[Episode],
+    kind: str = "pinv",
+    T_ini: int = 4,
+    N: int = 30,
+    *,
+    ridge: float = 1e-6,
+    block_weight: float = 1.0,
+    period: int = 1,
+    input_map: ArrayLike | None = None,
+) -> Predictor:
+    """Fit a predictor of any plant.
+
+    Signals are scaled by their root mean square before they are fitted, so that a ridge means the
+    same for every plant.
+
+    Args:
+        episodes: of the plant, see `Episode.of`.
+        kind: one of `KINDS`, see `fit`.
+        T_ini: samples of the past that tell the plant's state: at least its lag.
+        N: samples to predict.
+        ridge: penalty per window on scaled columns, of `ridge`.
+        block_weight: of `ridge` and several agents: the penalty on what one does to another is this
+            squared times as large.
+        period: of `periodic`: samples after which the plant repeats itself.
+        input_map: of `periodic`: what the inputs of an agent act by, shape (w, m), such as the net
+            wrench of forces; the identity if left out.
+
+    Raises:
+        PredictorError: an unknown kind, too little data, or inputs that do not excite the plant.
+    """
+    if kind not in KINDS:
+        raise PredictorError("kind", repr(kind), ", ".join(KINDS), did_you_mean(kind, KINDS))
+    if (period > 1) != (kind == "periodic"):
+        raise PredictorError("period", f"{period} of {kind!r}", "above 1 of 'periodic', else 1")
+    if not (T_ini >= 1 and N >= 1 and ridge >= 0.0 and block_weight > 0.0):
+        got = f"{T_ini}, {N}, {ridge:g}, {block_weight:g}"
+        raise PredictorError("T_ini, N, ridge, block_weight", got, "numbers above 0")
+    if not episodes:
+        raise PredictorError("episodes", "none", "at least one")
+    n, m, p = *episodes[0].u.shape[1:], episodes[0].y.shape[2]
+    B = np.eye(m) if input_map is None else as_signal("input_map", input_map)[:, 0]
+    if B.shape[1] != m:
+        raise PredictorError("input_map", f"shape {B.shape}", f"(w, {m})")
+    check_episodes(episodes, Layout(n, m, p, T_ini, N, (1.0,) * m, (1.0,) * p, everyone(n)))
+    inputs = [episode.deviations()[0] for episode in episodes]
+    scales = _sizes(inputs), _sizes([episode.deviations()[1] for episode in episodes])
+    layout = Layout(n, m, p, T_ini, N, *scales, everyone(n))
+    meta = PredictorMeta(n, N, T_ini, kind, period, ridge, block_weight, plant=layout)
+    if kind == "pinv" or ridge == 0.0:
+        scaled = [episode.scaled_deviations(layout)[0] for episode in episodes]
+        rank, full = hankel_rank(scaled, T_ini + N), n * m * (T_ini + N)
+        if rank < full:
+            raise PredictorError(
+                "inputs",
+                f"a Hankel matrix of rank {rank}",
+                f"rank {full}: persistently exciting of order {T_ini + N}",
+                "too little data, or an input that hardly varies",
+            )
+    return fit(episodes, meta, B / np.array(_sizes([u @ B.T for u in inputs]))[:, None])
+
+
+def _sizes(signals: Sequence[Array]) -> tuple[float, ...]:
+    """Root mean squares of the components of signals (T, n, dim); 1 where one is always zero."""
+    squares = np.concatenate([signal.reshape(-1, signal.shape[2]) for signal in signals]) ** 2
+    sizes = np.sqrt(squares.mean(axis=0))
+    return tuple(np.where(sizes > 0.0, sizes, 1.0).tolist())

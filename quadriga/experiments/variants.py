@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from quadriga.agents.predictor.fits import KINDS
+from quadriga.agents.predictor.predictor import KINDS
 from quadriga.shared.config.load import flatten, parse_assignment, read_toml
 from quadriga.shared.controller_line import KEY as CONTROLLER
 from quadriga.shared.errors import ConfigError

@@ -12,17 +12,14 @@ import numpy as np
 from matplotlib.figure import Figure
 from rich.console import Console
 
-from quadriga.agents.predictor.fits import KINDS
 from quadriga.agents.predictor.gates import (
     GAIN_TIMES,
-    Bounds,
     GateReport,
-    PeersFigures,
     Provenance,
     coupling_table,
     squared_errors,
 )
-from quadriga.agents.predictor.predictor import Predictor
+from quadriga.agents.predictor.predictor import KINDS, Predictor
 from quadriga.agents.predictor.store import predictor_sha256
 from quadriga.charts.colours import PALETTE
 from quadriga.charts.draw import add_beside, tidy_axes
@@ -187,13 +184,16 @@ def build_report_tables(report: FitReport, *, whole: bool = False) -> list[Table
     """Everything about one predictor; `whole`: with the errors at every sample of the horizon."""
     N, robots = len(report.rmse), robot_names(report.predictor.layout.agents)
     shown = range(N) if whole else np.linspace(0, N - 1, min(N, _SHOWN)).round().astype(int)
-    held = report.gates.rmse_persistence
+    held, harm = report.gates.rmse_persistence, report.gates.harm
     outputs = [
         (
             label,
             format_output(name, rmse),
             format_output(name, held[name]),
             format_number(rmse / held[name] if held[name] else None, ".2f"),
+            "{:.1f} ({:.1f} … {:.1f})".format(*(100.0 * x for x in harm[name]))
+            if name in harm
+            else NOTHING,
         )
         for (name, rmse), label in zip(report.gates.rmse.items(), LABELS, strict=True)
     ]
@@ -213,13 +213,17 @@ def build_report_tables(report: FitReport, *, whole: bool = False) -> list[Table
         (robot, *map(format_number, row))
         for robot, row in zip(robots, coupling_table(report.predictor).tolist(), strict=True)
     ]
-    note = f"All robots, {report.gates.windows} held-out windows of {N} samples."
+    note = (
+        f"All robots, {report.gates.windows} held-out windows of {N} samples. By peers: how much "
+        "larger the squared error is with the predicted effect of the peers' forces than without "
+        "it, with a 95 % interval. Of a planner whose agents respond to each other's plans, "
+        f"certainly more than {100.0 * report.config.identification.max_peers_harm:g} % is refused."
+    )
     norms = "Frobenius norms of the scaled G_ij: what robot j (column) does to robot i (row)."
-    columns = ("output", "RMSE", "persistence", "ratio")
+    columns = ("output", "RMSE", "persistence", "ratio", "by peers [%]")
     return [
         _build_figures(report, robots),
         Table("Held-out error", columns, tuple(outputs), (note,)),
-        *([_build_peers(report.gates.peers, report.config)] if report.gates.peers else []),
         Table("RMSE / persistence over the horizon", ("ahead", *LABELS), tuple(horizon)),
         Table("Coupling", ("", *robots), tuple(coupling), (norms,)),
     ]
@@ -295,32 +299,6 @@ def _build_figures(report: FitReport, robots: Sequence[str]) -> Table:
     ]
     title = f"Predictor {report.name}, {layout.agents} robots"
     return Table(title, ("figure", "value", "limit"), tuple(rows))
-
-
-def _build_peers(peers: PeersFigures, config: Config) -> Table:
-    rows = tuple(
-        (
-            label,
-            format_number(peers.share[name], ".3f"),
-            _format_bounds(peers.slope[name], ".2f"),
-            _format_bounds(peers.harm[name], ".1f", 100.0),
-        )
-        for name, label in zip(OUTPUTS, LABELS, strict=True)
-    )
-    columns = ("output", "of the own", "measured / predicted", "more squared error [%]")
-    note = (
-        "Part of held-out predictions that is due to the forces of peers: its size for one peer "
-        "over that of the robot's own forces; how much of it is measured, and how much larger the "
-        "squared error is with it than without it, with 95 % intervals. Of a planner whose agents "
-        "respond to each other's plans, certainly more than "
-        f"{100.0 * config.identification.max_peers_harm:g} % is refused."
-    )
-    return Table("Effect of peers", columns, rows, (note,))
-
-
-def _format_bounds(bounds: Bounds, digits: str, factor: float = 1.0) -> str:
-    value, low, high = (format_number(number, digits, factor) for number in bounds)
-    return value if bounds.low is None else f"{value} ({low} … {high})"
 
 
 def draw(reports: Sequence[FitReport], path: Path) -> None:

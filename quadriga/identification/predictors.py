@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import json
 import os
 import tempfile
 from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any, Final
 
 from rich.console import Console
 
-from quadriga.agents.predictor.fits import fit as fit_predictor
 from quadriga.agents.predictor.gates import GateReport, Provenance, gates_in_force, read, run_gates
-from quadriga.agents.predictor.measured_response import check_measured_team
+from quadriga.agents.predictor.measured_response import read_pulse_responses
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
+from quadriga.agents.predictor.predictor import fit as fit_predictor
 from quadriga.agents.predictor.store import save, versions
 from quadriga.identification.cache import data_path, predictor_path
 from quadriga.identification.collect import collect, collection_seconds
@@ -20,10 +22,15 @@ from quadriga.identification.dataset import Dataset, check_excitation, read_data
 from quadriga.progress import build_progress
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import config_sha256
-from quadriga.shared.errors import PredictorError, QuadrigaError
+from quadriga.shared.errors import PredictorError, PredictorFileError, QuadrigaError
 from quadriga.shared.runtime.blas import use_one_blas_thread
 from quadriga.shared.runtime.clock import monotonic
 
+# What a true response depends on beside the controller: of a predictor's meta, and sections.
+_TEAM: Final = (
+    "robots", "robot", "yokes", "alternate_phase", "stance_ms", "stand_ms", "interface",
+)  # fmt: skip
+_PLANT: Final = ("motors", "sensors", "estimator")
 Judged = tuple[Predictor, Provenance]  # a predictor and the figures of its gates, whatever they say
 
 
@@ -107,6 +114,34 @@ def fit(config: Config, dataset: Dataset, path: Path) -> Judged:
     if refusal(provenance.gates, config) is None:
         save(path, predictor, asdict(provenance))
     return predictor, provenance
+
+
+def measured_team(config: Config) -> dict[str, Any]:
+    """What a team's true response depends on, by key, as JSON has it."""
+    meta = PredictorMeta.of(config)
+    known = {name: getattr(meta, name) for name in _TEAM}
+    known |= {f"controller.{key}": value for key, value in meta.controller}
+    for section in _PLANT:
+        known |= {f"{section}.{k}": v for k, v in asdict(getattr(config, section)).items()}
+    team: dict[str, Any] = json.loads(json.dumps(known))
+    return team
+
+
+def check_measured_team(config: Config) -> None:
+    """Refuse configured responses of another team.
+
+    Raises:
+        PredictorFileError: no such file, not one of responses, or of another team.
+    """
+    if not config.response_file:
+        return
+    measured = read_pulse_responses(Path(config.response_file)).team
+    for key, expected in measured_team(config).items():
+        if measured.get(key) != expected:
+            got = f"responses of a team with {key} = {measured.get(key)!r}"
+            raise PredictorFileError(
+                "identification.response", got, f"{expected!r}", "measure it: `quadriga probe`"
+            )
 
 
 def refusal(gates: GateReport, config: Config) -> PredictorError | None:

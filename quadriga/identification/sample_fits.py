@@ -10,9 +10,8 @@ import numpy as np
 
 from quadriga.agents.gait import nominal_forces, scheduled_stance
 from quadriga.agents.predictor.episode import U_SCALE, Y_SCALE, Episode
-from quadriga.agents.predictor.fits import KINDS, fit
 from quadriga.agents.predictor.gates import coupling_table, run_gates
-from quadriga.agents.predictor.predictor import PredictorMeta
+from quadriga.agents.predictor.predictor import KINDS, PredictorMeta, fit
 from quadriga.agents.time_grid import sample_starts
 from quadriga.identification.behaviour import numbers
 from quadriga.shared.config.load import load
@@ -41,9 +40,7 @@ def samples() -> Iterator[Array]:
             # Not the condition: its last bit depends on where in memory the arrays lie.
             yield numbers(gates.error, gates.radius)
             yield from (np.array(gates.gains), coupling_table(predictor))
-            if gates.peers is not None:
-                slopes, harms = gates.peers.slope.values(), gates.peers.harm.values()
-                yield from (numbers(*bounds) for bounds in (*slopes, *harms))
+            yield from (numbers(*bounds) for bounds in gates.harm.values())
             yield np.array([*gates.rmse.values(), *gates.rmse_persistence.values()])
 
 

@@ -12,9 +12,8 @@ from scipy import linalg
 
 from quadriga.agents.gait import scheduled_stance
 from quadriga.agents.predictor.episode import Episode
-from quadriga.agents.predictor.fits import fit
 from quadriga.agents.predictor.gates import Provenance, run_gates
-from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
+from quadriga.agents.predictor.predictor import Predictor, PredictorMeta, fit
 from quadriga.agents.predictor.store import save, versions
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robots.conventions import Array

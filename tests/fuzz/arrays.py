@@ -13,7 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from quadriga.agents.predictor.episode import Episode, check_episodes, team_layout
+from quadriga.agents.predictor.episode import Episode, check_episodes, team_layout, wrench_map
 from quadriga.agents.predictor.gates import GateReport, Provenance, read
 from quadriga.agents.predictor.measured_response import (
     PulseResponses,
@@ -155,10 +155,10 @@ def pulse_responses(folder: Path) -> Archives:
     meta = PredictorMeta.of(load(None, SMALL))
     random = np.random.default_rng(0)
     u, y = random.normal(size=(2, 1, 6, meta.N, 12)), random.normal(size=(2, 1, 6, meta.N, 1, 6))
-    responses = PulseResponses(np.array([0, 100]), u, y, {})
+    responses, wrench = PulseResponses(np.array([0, 100]), u, y, {}), wrench_map(meta.robot)
 
     def read_all(path: Path) -> None:
-        fit_measured_response(read_pulse_responses(path), meta)
+        fit_measured_response(read_pulse_responses(path), meta.layout, meta.period, wrench)
 
     return Archives(
         folder / "responses.npz", lambda path: write_pulse_responses(path, responses), read_all

@@ -9,17 +9,14 @@ from typing import Final
 
 from rich.console import Console
 
-from quadriga.agents.predictor.measured_response import (
-    PulseResponses,
-    measured_team,
-    write_pulse_responses,
-)
+from quadriga.agents.predictor.measured_response import PulseResponses, write_pulse_responses
 from quadriga.experiments.probe.cache import ensure_responses
 from quadriga.experiments.probe.outcome import ProbeOutcome, build_outcome
 from quadriga.experiments.probe.probe_figure import draw_probe
 from quadriga.experiments.probe.probe_tables import build_details, build_overall
 from quadriga.experiments.probe.probed import Probed
 from quadriga.identification.fit_report import write_json
+from quadriga.identification.predictors import measured_team
 from quadriga.shared.config.sections import Config
 from quadriga.shared.runtime.atomic import write_text
 

@@ -18,11 +18,9 @@ from scipy import integrate, linalg, optimize
 from quadriga.agents.planner import planner_qp
 from quadriga.agents.planner.planner_qp import Condensed
 from quadriga.agents.predictor.episode import Y_SCALE, Episode
-from quadriga.agents.predictor.fits import fit_plant
 from quadriga.agents.predictor.gates import (
     Bounds,
     GateReport,
-    PeersFigures,
     Provenance,
     are_same_costs,
     best_response_map,
@@ -31,12 +29,12 @@ from quadriga.agents.predictor.gates import (
     held_out_error,
     iteration_radius,
     load_checked,
-    peers_figures,
+    peers_harm,
     physical_height,
     probe_costs,
     run_gates,
 )
-from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
+from quadriga.agents.predictor.predictor import Predictor, PredictorMeta, fit_plant
 from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config, PlannerConfig
 from quadriga.shared.errors import PredictorError
@@ -98,13 +96,10 @@ def test_a_right_predictor_passes(plant: Config, predictor: Predictor, linear_te
         ({"error": np.nan}, "held-out error: got nan"),
         ({"gains": ((1.0, 1.0), (-1.6, 1.0))}, r"r2 at 0\.1 s: got -1\.60, expected 0\.3 … 2"),
         ({"gains": ((np.nan, 1.0),)}, "got nan"),
-        ({"radius": np.nan}, "radius of the best-response map: got nan"),
+        ({"radius": np.nan, "cost": "own"}, "radius of the best-response map: got nan"),
         ({"radius": 1.2}, r"best-response map.*raise identification\.block_weight"),
         ({"radius": 1.2, "cost": "team"}, "cooperative map: got 1.200, expected below 1 "),
-        (
-            {"peers": PeersFigures({}, {}, {"z": Bounds(0.3, 0.1, 0.5)})},
-            "peers on z: got 30 % more",
-        ),
+        ({"harm": {"z": Bounds(0.3, 0.1, 0.5)}}, "peers on z: got 30 % more"),
     ],
 )
 def test_a_figure_beyond_its_limit_is_refused(
@@ -114,12 +109,12 @@ def test_a_figure_beyond_its_limit_is_refused(
     report = replace(FINE, **changes)
     with pytest.raises(PredictorError, match=text):
         report.check(plant)
-    if "radius" in changes or "peers" in changes:  # nobody answers anybody's plans
+    if "radius" in changes or "harm" in changes:  # nobody answers anybody's plans
         for kind in ("centralised", "decentralised"):
             report.check(of_kind(plant, kind))
-    limited_ = limited(plant, max_radius=2.0, max_peers_harm=1e9)
-    if changes in ({"radius": 1.2}, {"peers": report.peers}):
-        report.check(limited_)
+    if not {"error", "gains", "cost"} & set(changes):
+        report = replace(report, radius=min(report.radius, 1.5))
+        report.check(limited(plant, max_radius=2.0, max_peers_harm=1e9))
 
 
 @pytest.mark.parametrize("responds", [True, False])
@@ -415,29 +410,14 @@ def with_peers(predictor: Predictor, factor: float, invented: float = 0.0) -> Pr
     return replace(predictor, parts=G)
 
 
-def figures_of(predictor: Predictor, *episodes: Episode) -> PeersFigures:
-    found = peers_figures(predictor, episodes)
-    assert found is not None
-    return found
-
-
 @pytest.mark.parametrize("factor", [0.5, 1.0, 2.0, -1.0])
-def test_the_slope_is_what_is_measured_over_what_is_predicted(
+def test_the_harm_is_that_of_a_part_too_large_or_small(
     factor: float, predictor: Predictor, linear_team: Team
 ) -> None:
-    """Without noise r is the true effect q, and p = a q: slope 1/a, harm ((1 − a)² − 1)."""
-    data = linear_team(2).episode(600, 50)
-    found = figures_of(with_peers(predictor, factor), data)
+    """Without noise r is the true effect q, and p = a q: harm ((1 − a)² − 1)."""
+    found = peers_harm(with_peers(predictor, factor), [linear_team(2).episode(600, 50)])
     for name in COUPLED:
-        for bound in found.slope[name]:
-            assert bound == pytest.approx(1.0 / factor, abs=1e-3)
-        for bound in found.harm[name]:
-            assert bound == pytest.approx((1.0 - factor) ** 2 - 1.0, abs=1e-3)
-        share = figures_of(predictor, data).share[name]
-        assert share is not None
-        assert found.share[name] == pytest.approx(abs(factor) * share, rel=0.05)
-    silent = figures_of(with_peers(predictor, 0.0), data)
-    assert (silent.share["vx"], silent.slope["vx"]) == (0.0, Bounds(None, None, None))
+        np.testing.assert_allclose(found[name], (1.0 - factor) ** 2 - 1.0, atol=1e-3)
 
 
 @pytest.mark.parametrize("coupling", [0.0, 1.0])
@@ -447,32 +427,24 @@ def test_who_invents_effects_of_peers_is_refused(
     team = linear_team(2, coupling)
     meta = replace(PredictorMeta.of(plant), ridge=1e-9, block_weight=1.0)
     right, data = fit_ridge([team.episode(1500, 1)], meta), team.episode(600, 50, noise=0.01)
-    replace(FINE, peers=figures_of(right, data)).check(plant)
-    found = figures_of(with_peers(right, 1.0, invented=1.0), data)
+    replace(FINE, harm=peers_harm(right, [data])).check(plant)
+    found = peers_harm(with_peers(right, 1.0, invented=1.0), [data])
     with pytest.raises(PredictorError, match=r"effect of peers on z: got \d+ % more squared error"):
-        replace(FINE, peers=found).check(plant)
+        replace(FINE, harm=found).check(plant)
 
 
-def test_figures_against_windows_one_by_one(predictor: Predictor, linear_team: Team) -> None:
+def test_harm_against_windows_one_by_one(predictor: Predictor, linear_team: Team) -> None:
     changed = with_peers(predictor, 0.7, invented=0.2)
-    data = linear_team(2).episode(60, 51, noise=0.01)
-    T_ini, N, past = changed.layout.T_ini, changed.layout.N, changed.layout.past
+    data, alone = linear_team(2).episode(300, 51, noise=0.01), with_peers(changed, 0.0)
+    T_ini, N = changed.layout.T_ini, changed.layout.N
     z, dy = data.windows(T_ini, N)
-    p, r, own = [], [], []
-    for k in range(60 - T_ini - N + 1):
-        for i, j in ((0, 1), (1, 0)):
-            p.append(changed.block(i, j)[:, past:] @ z[j, past:, k])
-            own.append(changed.block(i, i)[:, past:] @ z[i, past:, k])
-            whole = changed.block(i, i) @ z[i, :, k] + changed.block(i, j) @ z[j, :, k]
-            r.append(dy[i, :, k] - (whole - p[-1]))
-    found = figures_of(changed, data)
-    peers, rest, alone = (np.array(x).reshape(-1, N, 6) for x in (p, r, own))
-    for k, name in enumerate(OUTPUTS):
-        x, y = peers[..., k].ravel(), rest[..., k].ravel()
-        assert found.slope[name].value == pytest.approx(x @ y / (x @ x))
-        assert found.harm[name].value == pytest.approx(((y - x) @ (y - x) - y @ y) / (y @ y))
-        assert found.share[name] == pytest.approx(np.linalg.norm(x) / np.linalg.norm(alone[..., k]))
-        assert found.slope[name][1:] == (None, None), "one block has no interval"
+    whole, without = (
+        ((one.predict(z) - dy) ** 2).reshape(2, N, 6, -1).sum(axis=(0, 1, 3))
+        for one in (changed, alone)
+    )
+    found = peers_harm(changed, [data])
+    np.testing.assert_allclose([found[name].value for name in OUTPUTS], whole / without - 1.0)
+    assert peers_harm(changed, [linear_team(2).episode(60, 51)]) == {}, "one block: no interval"
 
 
 def test_intervals_cover_the_truth_as_often_as_they_say(
@@ -480,16 +452,15 @@ def test_intervals_cover_the_truth_as_often_as_they_say(
 ) -> None:
     """Nineteen of twenty; fewer than sixteen of twenty would be a chance of one in 400."""
     changed, team = with_peers(predictor, 2.0), linear_team(2)
+    # The truth, from much more data: p is twice the effect, so that noise alone makes the harm.
+    truth = peers_harm(changed, [team.episode(20_000, 99, noise=0.3)])["vy"].value
     inside = 0
     for seed in range(20):
-        found = figures_of(changed, team.episode(500, 100 + seed, noise=0.3))
-        _, low, high = found.slope["vy"]
-        assert low is not None
-        assert high is not None
-        inside += low <= 0.5 <= high
+        _, low, high = peers_harm(changed, [team.episode(500, 100 + seed, noise=0.3)])["vy"]
+        inside += low <= truth <= high
     assert inside >= 16
 
 
 def test_a_single_robot_has_no_peers(plant: Config, linear_team: Team) -> None:
     alone = replace(plant, team=replace(plant.team, robots=1))
-    assert peers_figures(coupled(alone, 0, 1.0), [linear_team(1).episode(100, 2)]) is None
+    assert peers_harm(coupled(alone, 0, 1.0), [linear_team(1).episode(300, 2)]) == {}

@@ -11,17 +11,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from quadriga.agents.predictor.fits import fit
 from quadriga.agents.predictor.measured_response import (
     PulseResponses,
-    check_measured_team,
-    measured_team,
     read_pulse_responses,
     write_pulse_responses,
 )
-from quadriga.agents.predictor.predictor import PredictorMeta
+from quadriga.agents.predictor.predictor import PredictorMeta, fit
 from quadriga.agents.predictor.store import predictor_sha256
 from quadriga.experiments.probe.pulses import pulse_forces
+from quadriga.identification.predictors import check_measured_team, measured_team
 from quadriga.shared.config.load import load
 from quadriga.shared.errors import PredictorFileError
 from tests.agents.predictor.test_periodic import (

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 
 from quadriga.agents.gait import nominal_forces, scheduled_stance
 from quadriga.agents.predictor.episode import N_WRENCH, Y_SCALE, Episode, wrench_map
-from quadriga.agents.predictor.fits import fit, fit_plant
 from quadriga.agents.predictor.gates import coupling_table, held_out_error
 from quadriga.agents.predictor.periodic import (
     PeriodicFactors,
@@ -23,7 +22,7 @@ from quadriga.agents.predictor.periodic import (
     shrink,
     spread_over_samples,
 )
-from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
+from quadriga.agents.predictor.predictor import Predictor, PredictorMeta, fit, fit_plant
 from quadriga.agents.predictor.store import load, predictor_sha256, save
 from quadriga.agents.time_grid import gait_phase
 from quadriga.shared.config.sections import Config

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from quadriga.agents.predictor.episode import U_SCALE, Y_SCALE, Episode, everyone, wrench_map
-from quadriga.agents.predictor.fits import KINDS, fit, fit_plant
-from quadriga.agents.predictor.predictor import PredictorMeta
+from quadriga.agents.predictor.predictor import KINDS, PredictorMeta, fit, fit_plant
 from quadriga.agents.predictor.store import predictor_sha256
 from quadriga.shared.config.sections import Config, TeamConfig
 from quadriga.shared.errors import PredictorError

@@ -11,9 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from quadriga.agents.predictor.episode import Episode, Layout, everyone
-from quadriga.agents.predictor.fits import fit, fit_plant
 from quadriga.agents.predictor.hankel import hankel, split
-from quadriga.agents.predictor.predictor import PredictorMeta
+from quadriga.agents.predictor.predictor import PredictorMeta, fit, fit_plant
 from quadriga.agents.predictor.regression import (
     normal_equations,
     reduce,

@@ -15,9 +15,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from quadriga.agents.predictor.fits import fit_plant
 from quadriga.agents.predictor.gates import Provenance, read
-from quadriga.agents.predictor.predictor import Predictor
+from quadriga.agents.predictor.predictor import Predictor, fit_plant
 from quadriga.agents.predictor.store import load, predictor_sha256, save
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.runtime import npz

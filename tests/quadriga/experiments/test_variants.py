@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from quadriga.agents.predictor.fits import KINDS
+from quadriga.agents.predictor.predictor import KINDS
 from quadriga.experiments.variants import (
     PLANNERS,
     PREDICTORS,

@@ -15,8 +15,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from rich.console import Console
 
-from quadriga.agents.predictor.fits import KINDS
 from quadriga.agents.predictor.gates import read
+from quadriga.agents.predictor.predictor import KINDS
 from quadriga.commands.parser import main
 from quadriga.identification import fit_report
 from quadriga.identification.cache import predictor_path
