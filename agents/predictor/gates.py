@@ -230,12 +230,7 @@ def load_checked(path: Path, config: Config) -> tuple[Predictor, Provenance]:
 
 
 def check_fitted_for(config: Config, path: Path, predictor: Predictor) -> None:
-    """Refuse a predictor of another team, gait, horizon, interface or low level.
-
-    Args:
-        config: the team's configuration.
-        path: the predictor's file, for the error.
-        predictor: what was read from it.
+    """Refuse a predictor, read from `path`, of another team, gait, horizon or low level.
 
     Raises:
         PredictorFileError: it was fitted for another setting.
@@ -255,13 +250,7 @@ def check_fitted_for(config: Config, path: Path, predictor: Predictor) -> None:
 
 
 def gates_in_force(gates: GateReport, config: Config, predictor: Predictor) -> GateReport:
-    """The figures of a predictor with the radius of the QPs of `config`.
-
-    Args:
-        gates: as they are stored with the predictor.
-        config: the team's configuration.
-        predictor: whose figures these are.
-    """
+    """The figures that are stored with a predictor, with the radius of the QPs of `config`."""
     if not find_kind(config.planner.kind).needs_peers:
         return gates
     probes = probe_costs(config, predictor)
@@ -272,12 +261,7 @@ def gates_in_force(gates: GateReport, config: Config, predictor: Predictor) -> G
 
 
 def run_gates(config: Config, predictor: Predictor, held_out: Sequence[Episode]) -> GateReport:
-    """Measure the figures of a predictor; `GateReport.check` compares them with their limits.
-
-    Args:
-        config: team, gait and controller.
-        predictor: whose figures are measured.
-        held_out: episodes that the fit has not seen.
+    """Measure the figures of a predictor on episodes that its fit has not seen.
 
     Raises:
         PredictorError: no held-out episode is long enough.

@@ -22,7 +22,7 @@ from quadriga.agents.predictor.episode import (
 from quadriga.agents.predictor.measured_response import fit_measured_response, read_pulse_responses
 from quadriga.agents.predictor.periodic import Period, PeriodicFactors, fit_periodic
 from quadriga.agents.predictor.regression import (
-    hankel_rank,
+    check_excitation,
     normal_equations,
     solve_pinv,
     solve_ridge,
@@ -373,14 +373,7 @@ def fit_plant(
     meta = PredictorMeta(n, N, T_ini, kind, period, ridge, block_weight, plant=layout)
     if kind == "pinv" or ridge == 0.0:
         scaled = [episode.scaled_deviations(layout)[0] for episode in episodes]
-        rank, full = hankel_rank(scaled, T_ini + N), n * m * (T_ini + N)
-        if rank < full:
-            raise PredictorError(
-                "inputs",
-                f"a Hankel matrix of rank {rank}",
-                f"rank {full}: persistently exciting of order {T_ini + N}",
-                "too little data, or an input that hardly varies",
-            )
+        check_excitation(scaled, T_ini + N)
     return fit(episodes, meta, B / np.array(_sizes([u @ B.T for u in inputs]))[:, None])
 
 

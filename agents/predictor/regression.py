@@ -42,6 +42,22 @@ def hankel_rank(inputs: Sequence[Array], order: int) -> int:
     return len(S)
 
 
+def check_excitation(inputs: Sequence[Array], order: int) -> None:
+    """Refuse inputs (T, m) from which the plant's response cannot be told.
+
+    Raises:
+        PredictorError: together they are not persistently exciting of this order.
+    """
+    rank, full = hankel_rank(inputs, order), inputs[0].shape[1] * order
+    if rank < full:
+        raise PredictorError(
+            "inputs in the data",
+            f"a Hankel matrix of rank {rank}",
+            f"rank {full}: persistently exciting of order {order}",
+            "too little data, or an input that hardly varies: more noise, or shorter holds of it",
+        )
+
+
 class Regression(NamedTuple):
     """Sums over M windows of scaled signals, z = [z^1; …; z^n], z^j = [u_ini^j; y_ini^j; u^j].
 

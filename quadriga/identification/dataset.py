@@ -9,9 +9,9 @@ from typing import Final
 
 import numpy as np
 
+from quadriga.agents.predictor import regression
 from quadriga.agents.predictor.episode import SIGNALS, Episode, team_layout
 from quadriga.agents.predictor.hankel import required_samples
-from quadriga.agents.predictor.regression import hankel_rank
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError, PredictorFileError
 from quadriga.shared.robots.conventions import N_FORCES, Array
@@ -48,16 +48,8 @@ def check_excitation(config: Config, training: Sequence[Episode]) -> None:
             "collect more: identification.seconds, or fewer falls",
         )
     layout = team_layout(n, planner.T_ini, planner.N)
-    length = planner.T_ini + planner.N + order
     inputs = [episode.scaled_deviations(layout)[0] for episode in training]
-    rank = hankel_rank(inputs, length)
-    if rank < N_FORCES * n * length:
-        raise PredictorError(
-            "collected data",
-            f"a Hankel matrix of the inputs of rank {rank}",
-            f"rank {N_FORCES * n * length}: inputs persistently exciting of order {length}",
-            "more noise (identification.noise) or shorter holds (identification.noise_hold_ms)",
-        )
+    regression.check_excitation(inputs, planner.T_ini + planner.N + order)
 
 
 def write_data(path: Path, dataset: Dataset) -> None:

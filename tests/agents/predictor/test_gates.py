@@ -42,7 +42,6 @@ from quadriga.shared.robots.conventions import OUTPUTS, Array
 from tests.a1 import TOTAL_MASS, build_problem
 from tests.agents.conftest import fit_ridge
 from tests.agents.predictor.plants import Sizes, first_window, random_plant, record
-from tests.plugins.kinds import install_kind
 
 Team = Callable[..., Any]
 FINE = GateReport(1, {}, {}, 0.5, ((1.0, 1.0), (1.0, 1.0)), 0.1)
@@ -115,20 +114,6 @@ def test_a_figure_beyond_its_limit_is_refused(
     if not {"error", "gains", "cost"} & set(changes):
         report = replace(report, radius=min(report.radius, 1.5))
         report.check(limited(plant, max_radius=2.0, max_peers_harm=1e9))
-
-
-@pytest.mark.parametrize("responds", [True, False])
-def test_a_plugin_that_responds_to_plans_is_held_against_the_radius(
-    plant: Config, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, responds: bool
-) -> None:
-    kind = "answering" if responds else "deaf"
-    install_kind(tmp_path, monkeypatch, kind, f"'nowhere:P', needs_peers={responds}")
-    report = replace(FINE, radius=1.9)
-    if not responds:
-        report.check(of_kind(plant, kind))
-        return
-    with pytest.raises(PredictorError, match=r"radius of the best-response map: got 1\.900"):
-        report.check(of_kind(plant, kind))
 
 
 # ---- files
