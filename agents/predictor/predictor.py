@@ -166,16 +166,22 @@ class Predictor:
     layout: Layout = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
+        parts = self.parts
+        agents = (
+            parts.response.shape[2:3] if isinstance(parts, PeriodicFactors) else parts.shape[1:2]
+        )
+        if agents != (self.meta.robots,):  # before the layout: a file may claim any number
+            raise PredictorError("predictor", f"arrays of {agents} agents", f"{self.meta.robots}")
         layout = self.meta.layout
         object.__setattr__(self, "layout", layout)
-        if isinstance(self.parts, PeriodicFactors):
-            self.parts.check(layout)
+        if isinstance(parts, PeriodicFactors):
+            parts.check(layout)
             return
         n = layout.agents
         expected = (self.phases, n, n, layout.rows, layout.width)
-        if self.parts.shape != expected:
-            raise PredictorError("predictor.G", f"shape {self.parts.shape}", f"{expected}")
-        self.parts.setflags(write=False)
+        if parts.shape != expected:
+            raise PredictorError("predictor.G", f"shape {parts.shape}", f"{expected}")
+        parts.setflags(write=False)
 
     @property
     def phases(self) -> int:

@@ -78,7 +78,7 @@ def load(path: Path) -> tuple[Predictor, Any]:
             document = json.loads(str(archive["document"]))
             names = ("G",) if "G" in archive.files else FACTORS
             arrays = {name: np.asarray(archive[name], dtype=np.float64) for name in names}
-        found, sha256 = document["format"], document["sha256"]
+        found, sha256, provenance = (document[k] for k in ("format", "sha256", "provenance"))
         if found != FORMAT:
             raise PredictorFileError(
                 f"predictor {path}", f"format {found}", f"format {FORMAT}", REMEDY
@@ -99,7 +99,7 @@ def load(path: Path) -> tuple[Predictor, Any]:
             "an unchanged file",
             f"corrupt: delete it; {REMEDY}",
         )
-    return predictor, document["provenance"]
+    return predictor, provenance
 
 
 def not_a_predictor(path: Path, error: Exception) -> PredictorFileError:

@@ -193,7 +193,7 @@ def test_what_is_saved_is_read(tmp_path: Path, fitted: Predictor) -> None:
     assert isinstance(again.parts, PeriodicFactors)
     assert predictor_sha256(again) == digest
     np.testing.assert_array_equal(again.block(1, 2, 17), fitted.block(1, 2, 17))
-    with pytest.raises(PredictorError, match=r"predictor\.response: got shape"):
+    with pytest.raises(PredictorError, match=r"arrays of \(3,\) agents, expected 2"):
         Predictor(meta_of(2), fitted.parts)
 
 
