@@ -37,7 +37,7 @@ from quadriga.shared.topics import SAMPLE_MS
 KINDS: Final = ("pinv", "ridge", "periodic")  # of fits
 # Keys of the controller that act only in a failure and do not change the plant that is fitted.
 _SAFETY_KEYS: Final = ("damping", "fall_tilt", "max_failures")
-_KEYS: Final = {
+_KEYS: Final = {  # of the configuration, in the meta under their own names
     "team": ("robots", "robot", "yokes", "alternate_phase"),
     "planner": ("N", "T_ini", "interface"),
     "gait": ("stance_ms", "stand_ms"),

@@ -116,21 +116,6 @@ def test_a_wrong_height_gain_is_refused_with_figure_and_limit() -> None:
 
 
 @pytest.mark.usefixtures("cache", "no_collection")
-@pytest.mark.parametrize("damage", ["garbage", "empty", "cut", "flipped"])
-def test_a_damaged_predictor_is_one_clear_error(damage: str) -> None:
-    path = predictor_path(TINY)
-    whole = path.read_bytes()
-    try:
-        path.write_bytes(damaged(whole, damage))
-        with pytest.raises(PredictorError) as caught:
-            ensure_predictor(TINY, silent())
-    finally:
-        path.write_bytes(whole)
-    assert str(path) in caught.value.name
-    assert caught.value.cause
-
-
-@pytest.mark.usefixtures("cache", "no_collection")
 @pytest.mark.parametrize("damage", ["garbage", "empty", "cut", "flipped", "missing"])
 def test_damaged_data_are_one_clear_error(damage: str) -> None:
     path = data_path(TINY)
