@@ -18,7 +18,7 @@ import osqp
 from numpy.typing import NDArray
 from scipy import sparse
 
-from quadriga.agents.predictor.episode import U_SCALE, Y_SCALE, Episode
+from quadriga.agents.predictor.episode import U_SCALE, Y_SCALE, Episode, team_layout
 from quadriga.agents.predictor.hankel import split
 from quadriga.shared.config.sections import PlannerConfig
 from quadriga.shared.robots.conventions import N_FORCES, N_OUTPUTS, Array
@@ -112,9 +112,10 @@ class DeepcQp:
         lambda_sigma: float,
         settings: Mapping[str, float] = DEFAULT,
     ) -> None:
-        self._config, n = config, episodes[0].robots
+        self._config, n = config, episodes[0].u.shape[1]
         T_ini, N = config.T_ini, config.N
-        u, y = zip(*(episode.scaled_deviations() for episode in episodes), strict=True)
+        layout = team_layout(n, T_ini, N)
+        u, y = zip(*(episode.scaled_deviations(layout) for episode in episodes), strict=True)
         data = split(u, y, T_ini, N)
         U_p, U_f = _robots_first(data.U_p, n, N_FORCES), _robots_first(data.U_f, n, N_FORCES)
         Y_p, Y_f = _robots_first(data.Y_p, n, N_OUTPUTS), _robots_first(data.Y_f, n, N_OUTPUTS)

@@ -23,8 +23,7 @@ import numpy as np
 
 from benchmarks.children import result_of
 from quadriga.agents.predictor.episode import Episode
-from quadriga.agents.predictor.fits import FITS, fit
-from quadriga.agents.predictor.predictor import PredictorMeta
+from quadriga.agents.predictor.predictor import KINDS, PredictorMeta, fit
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robots.conventions import N_FORCES, N_OUTPUTS
 from quadriga.shared.runtime.clock import monotonic
@@ -88,7 +87,7 @@ def main() -> None:
     """Measure, print a table and write JSON."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, help="JSON file to write")
-    parser.add_argument("--kinds", nargs="+", default=["ridge"], choices=sorted(FITS))
+    parser.add_argument("--kinds", nargs="+", default=["ridge"], choices=sorted(KINDS))
     parser.add_argument("--sizes", nargs="+", type=int, default=[s.robots for s in SIZES])
     parser.add_argument("--repeats", type=int, default=3)
     arguments = parser.parse_args()

@@ -171,7 +171,7 @@ def team(
     options: Options, robots: int, seconds: float, console: Console
 ) -> tuple[Config, Path | None, Predictor | None]:
     """A team that walks on flat ground, its predictor's file and the predictor."""
-    from quadriga.agents.planner.acceptance import load_checked
+    from quadriga.agents.predictor.gates import load_checked
     from quadriga.identification.predictors import ensure_predictor
     from quadriga.shared.config.load import load
     from quadriga.shared.planner_kinds import find_kind

@@ -22,9 +22,9 @@ from quadriga.agents.planner.planner_qp import (
 )
 from quadriga.agents.planner.qp_solver import SOLVERS, Solver
 from quadriga.agents.planner.team_planner import TeamPlanner, build_centralised
-from quadriga.agents.predictor.deepc import reduce
-from quadriga.agents.predictor.episode import Episode
+from quadriga.agents.predictor.episode import Episode, team_layout
 from quadriga.agents.predictor.predictor import Predictor
+from quadriga.agents.predictor.regression import reduce
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robots.conventions import Array
 
@@ -201,7 +201,7 @@ class TeamDeepc:
     def __init__(self, config: Config, episodes: tuple[Episode, ...]) -> None:
         planner = config.planner
         self._config, self._episodes = config, episodes
-        reduction = reduce(episodes, planner.T_ini, planner.N)
+        reduction = reduce(episodes, team_layout(config.team.robots, planner.T_ini, planner.N))
         self._model = build_model(reduction, planner, planner.lambda_g, planner.lambda_sigma)
         self._set_up = cache(self._build)
 

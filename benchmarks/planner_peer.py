@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.as_written import force_bounds
-from quadriga.agents.predictor.episode import U_SCALE, Y_SCALE, Episode
+from quadriga.agents.predictor.episode import U_SCALE, Y_SCALE, Episode, team_layout
 from quadriga.agents.predictor.hankel import split
 from quadriga.shared.config.sections import PlannerConfig
 from quadriga.shared.robots.conventions import Array
@@ -31,7 +31,8 @@ class CvxpyDeepc:
     def __init__(self, config: PlannerConfig, episodes: Sequence[Episode]) -> None:
         import cvxpy as cp
 
-        u, y = zip(*(episode.scaled_deviations() for episode in episodes), strict=True)
+        layout = team_layout(1, config.T_ini, config.N)
+        u, y = zip(*(episode.scaled_deviations(layout) for episode in episodes), strict=True)
         data = split(u, y, config.T_ini, config.N)
         N, rows = config.N, len(data.Y_p)
         self._u_ini, self._y_ini = cp.Parameter(len(data.U_p)), cp.Parameter(rows)

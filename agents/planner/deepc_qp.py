@@ -26,8 +26,8 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from quadriga.agents.planner.planner_qp import Condensed
-from quadriga.agents.predictor.deepc import Reduction
 from quadriga.agents.predictor.episode import Layout
+from quadriga.agents.predictor.regression import Reduction
 from quadriga.shared.config.sections import PlannerConfig
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.robots.conventions import N_LEGS, Array

@@ -22,9 +22,9 @@ from quadriga.agents.planner.planner_qp import (
     unpack,
 )
 from quadriga.agents.planner.qp_solver import NOMINAL, SOLVED, SOLVERS, Solver
-from quadriga.agents.predictor.deepc import reduce
-from quadriga.agents.predictor.episode import Episode
+from quadriga.agents.predictor.episode import Episode, team_layout
 from quadriga.agents.predictor.predictor import Predictor, check_sizes
+from quadriga.agents.predictor.regression import reduce
 from quadriga.agents.time_grid import horizon_stance, phase_of, walking_steps
 from quadriga.shared.codes import with_detail
 from quadriga.shared.config.sections import Config
@@ -156,7 +156,8 @@ def build_deepc_team(
 ) -> TeamPlanner:
     """The planner of the kind `deepc`, from the collected episodes; see `build_deepc`."""
     planner = config.planner
-    reduction = reduce(collected(), planner.T_ini, planner.N)
+    layout = team_layout(config.team.robots, planner.T_ini, planner.N)
+    reduction = reduce(collected(), layout)
     return build_deepc(
         config, build_model(reduction, planner, planner.lambda_g, planner.lambda_sigma)
     )

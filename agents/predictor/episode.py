@@ -1,29 +1,31 @@
-"""What a predictor is laid out for, and the data of a team: sizes, scales, episodes."""
+"""Data of a plant, and how its predictor is laid out: sizes, scales, episodes.
+
+A plant has n agents, each with m inputs and p outputs: a tank with its pumps is one agent, a team
+of yoked robots is n agents with twelve forces and six outputs each.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import ArrayLike
 
-from quadriga.agents.predictor.hankel import windows
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.messages import Reference
 from quadriga.shared.robots.conventions import N_FORCES, N_LEGS, N_OUTPUTS, Array
 from quadriga.shared.robots.registry import ROBOTS
 
-U_SCALE: Final = 10.0  # N
-Y_SCALE: Final = np.array([0.005, 0.1, 0.1, 0.02, 0.02, 0.2])  # m, m/s, m/s, rad, rad, rad/s
-N_WRENCH: Final = 6  # fx, fy, fz, mx, my, mz
-_FORCE_SCALE: Final = 40.0  # N: two stance feet with 20 N each
 SIGNALS: Final = ("u", "u_nominal", "y", "y_base")  # an episode's arrays
 
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """How a predictor of any plant is laid out; nothing in it is about robots.
+    """Sizes and scales of a predictor.
 
     Attributes:
         agents: n, parts of the plant with inputs and outputs of their own.
@@ -34,6 +36,7 @@ class Layout:
         u_scale: of an agent's inputs, m numbers; fits see inputs divided by them.
         y_scale: of its outputs, p numbers.
         members: of every agent: whose columns explain its outputs, in order, itself among them.
+        commanded: outputs whose base moves with a command that is known beforehand.
     """
 
     agents: int
@@ -44,6 +47,7 @@ class Layout:
     u_scale: tuple[float, ...]
     y_scale: tuple[float, ...]
     members: tuple[tuple[int, ...], ...]
+    commanded: tuple[int, ...] = ()
 
     @property
     def past(self) -> int:
@@ -60,9 +64,11 @@ class Layout:
         """Rows of a block: length of one agent's outputs over the horizon, p N."""
         return self.outputs * self.N
 
-    def strangers(self, i: int) -> list[int]:
-        """Agents whose columns do not explain the outputs of agent `i`."""
-        return [j for j in range(self.agents) if j not in self.members[i]]
+    def scales(self) -> tuple[Array, Array]:
+        """Scales of one agent's [u_ini; y_ini; u], shape (W,), and of its y, shape (p N,)."""
+        u, y = np.array(self.u_scale), np.array(self.y_scale)
+        z = np.concatenate([np.tile(u, self.T_ini), np.tile(y, self.T_ini), np.tile(u, self.N)])
+        return z, np.tile(y, self.N)
 
 
 def everyone(agents: int) -> tuple[tuple[int, ...], ...]:
@@ -70,23 +76,17 @@ def everyone(agents: int) -> tuple[tuple[int, ...], ...]:
     return (tuple(range(agents)),) * agents
 
 
-def scales(layout: Layout) -> tuple[Array, Array]:
-    """Scales of one agent's [u_ini; y_ini; u], shape (W,), and y, shape (p N,)."""
-    u, y = np.array(layout.u_scale), np.array(layout.y_scale)
-    parts = [np.tile(u, layout.T_ini), np.tile(y, layout.T_ini), np.tile(u, layout.N)]
-    return np.concatenate(parts), np.tile(y, layout.N)
-
-
 @dataclass(frozen=True, slots=True)
 class Episode:
-    """One walk of the whole team at 100 Hz; u_k is the mean over the 10 ms that end with y_k.
+    """A recording without gaps, of robots at 100 Hz: y_k may depend on u_k and all before.
 
     Attributes:
-        u: forces of all robots, shape (T, n, 12), N.
-        u_nominal: forces that deviations are counted from, shape (T, n, 12), N.
-        y: outputs z, vx, vy, roll, pitch, wz, shape (T, n, 6), m, m/s, rad, rad/s.
-        y_base: outputs that deviations are counted from (see `output_base`), shape (T, n, 6).
-        first_tick: world tick at the end of sample 0, which determines the gait's phase, ms.
+        u: inputs, shape (T, n, m); of robots forces, means over the 10 ms that end with y_k, N.
+        u_nominal: inputs that deviations are counted from, shape (T, n, m).
+        y: outputs, shape (T, n, p); of robots z, vx, vy, roll, pitch, wz, m, m/s, rad, rad/s.
+        y_base: outputs that deviations are counted from (see `output_base`), shape (T, n, p).
+        first_tick: tick at the end of sample 0, which tells the phase of a plant that repeats
+            itself; of robots ms.
 
     Raises:
         PredictorError: shapes that do not belong together, or numbers that are not finite.
@@ -99,60 +99,122 @@ class Episode:
     first_tick: int
 
     def __post_init__(self) -> None:
-        lead = self.u.shape[:2]
         for name in SIGNALS:
-            array = getattr(self, name)
-            expected = (*lead, N_FORCES if name.startswith("u") else N_OUTPUTS)
-            if array.shape != expected:
+            array, dims = getattr(self, name), (self.u if name[0] == "u" else self.y).shape[2:]
+            expected = (*self.u.shape[:2], *dims)
+            if array.ndim != 3 or array.shape != expected:
                 raise PredictorError(f"episode.{name}", f"shape {array.shape}", f"{expected}")
             if not np.isfinite(array).all():
                 raise PredictorError(
                     f"episode.{name}", "NaN or infinity", "finite numbers", "a robot fell?"
                 )
 
+    @classmethod
+    def of(cls, u: ArrayLike, y: ArrayLike, begin: int = 0) -> Episode:
+        """A recording of any plant, with nothing subtracted.
+
+        A plant that is linear about a working point needs deviations from it: no fit has an
+        intercept.
+
+        Args:
+            u: inputs, shape (T, m), or (T, n, m) of n agents.
+            y: outputs, shape (T, p), or (T, n, p).
+            begin: number of the first sample, which only a periodic plant depends on.
+        """
+        inputs, outputs = as_signal("u", u), as_signal("y", y)
+        return cls(inputs, np.zeros_like(inputs), outputs, np.zeros_like(outputs), begin + 1)
+
     @property
     def samples(self) -> int:
         """T, the number of samples."""
         return len(self.u)
 
-    @property
-    def robots(self) -> int:
-        """The size n of the team."""
-        return int(self.u.shape[1])
-
     def deviations(self) -> tuple[Array, Array]:
-        """Deviations u − u_nominal, shape (T, n, 12), and y − y_base, shape (T, n, 6)."""
+        """Deviations u − u_nominal, shape (T, n, m), and y − y_base, shape (T, n, p)."""
         return self.u - self.u_nominal, self.y - self.y_base
 
-    def scaled_deviations(self) -> tuple[Array, Array]:
-        """Deviations over their scales, robots stacked: shapes (T, 12 n) and (T, 6 n)."""
+    def scaled_deviations(self, layout: Layout) -> tuple[Array, Array]:
+        """Deviations over their scales, agents stacked: shapes (T, m n) and (T, p n)."""
         du, dy = self.deviations()
-        return ((du / U_SCALE).reshape(self.samples, -1), (dy / Y_SCALE).reshape(self.samples, -1))
+        u, y = du / np.array(layout.u_scale), dy / np.array(layout.y_scale)
+        return u.reshape(self.samples, -1), y.reshape(self.samples, -1)
 
     def windows(self, T_ini: int, N: int) -> tuple[Array, Array]:
         """Every window of deviations: a predictor's input and the output it should predict.
 
         Returns:
-            z, shape (n, 18 T_ini + 12 N, C): per robot [u_ini; y_ini; u], time-major;
-            y, shape (n, 6 N, C); C = T − T_ini − N + 1 windows.
+            z, shape (n, (m + p) T_ini + m N, C): per agent [u_ini; y_ini; u], time-major;
+            y, shape (n, p N, C); C = T − T_ini − N + 1 windows.
         """
-        return windows(*self.deviations(), T_ini, N)
+        u, y = (
+            # (C, n, dim, L) → (n, L, dim, C)
+            np.transpose(sliding_window_view(x, T_ini + N, axis=0), (1, 3, 2, 0))
+            for x in self.deviations()
+        )
+        n, _, _, count = u.shape
+        parts = (u[:, :T_ini], y[:, :T_ini], u[:, T_ini:])
+        z = np.concatenate([part.reshape(n, -1, count) for part in parts], axis=1)
+        return z, y[:, T_ini:].reshape(n, -1, count)
+
+
+def as_signal(name: str, values: ArrayLike) -> Array:
+    """A signal with an axis of agents, (T, n, dim), which may be given without, (T, dim).
+
+    Raises:
+        PredictorError: no array of numbers, or of other axes.
+    """
+    try:
+        array = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise PredictorError(name, "something else", "an array of numbers") from None
+    if array.ndim == 2:
+        array = array[:, None]
+    if array.ndim != 3:
+        axes = "(samples, components), or (samples, agents, components)"
+        raise PredictorError(name, f"shape {array.shape}", axes)
+    return array
+
+
+def check_episodes(episodes: Sequence[Episode], layout: Layout) -> None:
+    """Refuse data that no fit of this layout can use.
+
+    Raises:
+        PredictorError: no data, too little, or of another plant.
+    """
+    if not episodes:
+        raise PredictorError("episodes", "none", "at least one", "did every walk end in a fall?")
+    expected = layout.agents, layout.inputs, layout.outputs
+    for episode in episodes:
+        got = *episode.u.shape[1:], episode.y.shape[2]
+        if got != expected:
+            raise PredictorError(
+                "episode", f"(agents, inputs, outputs) = {got}", f"{expected}", "of another plant"
+            )
+        if episode.samples < layout.T_ini + layout.N:
+            raise PredictorError(
+                "episode",
+                f"{episode.samples} samples",
+                f"at least {layout.T_ini + layout.N}",
+                "cut short by a fall",
+            )
+
+
+# ---- a team of robots
+
+U_SCALE: Final = 10.0  # N
+Y_SCALE: Final = np.array([0.005, 0.1, 0.1, 0.02, 0.02, 0.2])  # m, m/s, m/s, rad, rad, rad/s
+N_WRENCH: Final = 6  # fx, fy, fz, mx, my, mz
+_FORCE_SCALE: Final = 40.0  # N: two stance feet with 20 N each
+_COMMANDED: Final = (1, 2, 5)  # vx, vy, wz
 
 
 def team_layout(
     robots: int, T_ini: int, N: int, members: tuple[tuple[int, ...], ...] | None = None
 ) -> Layout:
-    """The layout of a predictor of a team: forces and outputs of robots, with their scales.
-
-    Args:
-        robots: in the team.
-        T_ini: estimation horizon.
-        N: control horizon.
-        members: of each robot: whose columns explain its outputs; None: everybody's.
-    """
+    """The layout of a predictor of a team; None: everybody's columns explain everybody."""
+    sizes = robots, N_FORCES, N_OUTPUTS, T_ini, N
     u_scale, y_scale = (U_SCALE,) * N_FORCES, tuple(Y_SCALE.tolist())
-    whose = everyone(robots) if members is None else members
-    return Layout(robots, N_FORCES, N_OUTPUTS, T_ini, N, u_scale, y_scale, whose)
+    return Layout(*sizes, u_scale, y_scale, members or everyone(robots), _COMMANDED)
 
 
 def output_base(config: Config, reference: Reference) -> Array:
@@ -172,11 +234,11 @@ def commanded_outputs(reference: Reference) -> Array:
 
 
 def wrench_map(kind: str) -> Array:
-    """From the forces of four feet to their net wrench, in units of `_FORCE_SCALE`.
+    """From the forces of four feet to their net wrench, in units of `_FORCE_SCALE`. Shape (6, 12).
 
     Moments are about the point on the ground under the trunk, with the feet under their hips; their
     unit is that of the force times the distance of a foot from this point. So sideways forces alone
-    have no moment about the horizontal axes. Shape (6, 12).
+    have no moment about the horizontal axes.
 
     Args:
         kind: of robot, a key of `ROBOTS`.

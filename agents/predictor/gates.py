@@ -1,13 +1,14 @@
-"""Figures that a predictor must reach before a team may walk with it, and their limits.
+"""Which predictors a team may walk with: four figures, their limits, and the files that pass.
 
-Held-out error, height gain and effect of peers are measured here, with data that the fit has not
-seen. The radius of the iteration of plans is one of the planner's QPs: `agents/planner/acceptance`.
+Held-out error, height gain and effect of peers are measured with data that the fit has not seen.
+The radius of the iteration of plans is one of the planner's own QPs.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -16,180 +17,94 @@ from numpy.typing import NDArray
 from scipy import linalg
 from scipy.special import stdtrit
 
-from quadriga.agents.predictor.episode import Y_SCALE, Episode
-from quadriga.agents.predictor.predictor import Predictor
+from quadriga.agents.planner.cooperation import (
+    OWN,
+    TEAM,
+    cooperative_radius,
+    cost_of,
+    is_cooperative,
+)
+from quadriga.agents.planner.damping import kept_share
+from quadriga.agents.planner.planner_qp import PlannerProblem, build_problem
+from quadriga.agents.predictor.episode import Episode
+from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.predictor.regression import scaled_blocks
-from quadriga.agents.time_grid import gait_phase, horizon_stance, phase_of, walking_steps
+from quadriga.agents.predictor.store import REMEDY, load, not_a_predictor
+from quadriga.agents.time_grid import distinct_steps, horizon_stance, phase_of, walking_steps
 from quadriga.shared.config.sections import Config
-from quadriga.shared.errors import PredictorError
+from quadriga.shared.errors import PredictorError, PredictorFileError
 from quadriga.shared.planner_kinds import find_kind
-from quadriga.shared.robots.conventions import N_LEGS, N_OUTPUTS, OUTPUTS, Array
+from quadriga.shared.robots.conventions import N_LEGS, OUTPUTS, Array
+from quadriga.shared.runtime.npz import UNREADABLE
 from quadriga.shared.topics import SAMPLE_MS
 
-LEFT_OUT: Final = 0.02  # of the effect of own forces: a smaller effect of peers is as good as none
-UNDERSTATED: Final = 1.25  # slope above which the effect is certainly too small
-MATERIAL: Final = 0.02  # of the squared error: a smaller harm is not worth a word
-GAIN_TIMES: Final = (0.1, 0.25)  # s
+GAIN_TIMES: Final = (0.1, 0.25)  # s after a step of force, when the height response is compared
 _GAIN_FORCE: Final = 10.0  # N, on the robot looked at
 _BLOCK: Final = 100  # windows: 1 s, longer than a window's errors are alike
 _TAIL: Final = 0.975  # of the two-sided interval
+_SAME: Final = 1e-6  # relative: other machines have other last digits, other costs differ by more
+# Fields of the meta that must be as configured, beside the controller's keys.
+_MATCHED: Final = (
+    "robots", "robot", "stance_ms", "alternate_phase", "yokes", "interface", "N", "T_ini",
+)  # fmt: skip
 
 
 class Bounds(NamedTuple):
-    """An estimate with its 95 % interval; None where the data do not tell."""
+    """An estimate with its 95 % interval."""
 
-    value: float | None
-    low: float | None
-    high: float | None
-
-
-@dataclass(frozen=True, slots=True)
-class PeersFigures:
-    """The predicted effect of the peers' forces by output, in held-out windows of all robots.
-
-    With p the part of a prediction that is due to the peers' forces within the horizon, and r what
-    is measured less all other parts of the prediction. The forces of the data are random and
-    independent of each other, so p explains as much of r as the peers really do.
-
-    Attributes:
-        share: norm of p for one peer over that of the part due to the robot's own forces.
-        slope: Σ p r / Σ p²: 1 if the peers do what is predicted, 0 if p is invented, more than 1 if
-            p is too small. Below 0.5 predictions are better without p.
-        harm: (‖r − p‖² − ‖r‖²) / ‖r‖²: how much p raises the squared error; negative if it helps.
-        harm_limit: a predictor whose harm is certainly above this is refused.
-    """
-
-    share: Mapping[str, float | None]
-    slope: Mapping[str, Bounds]
-    harm: Mapping[str, Bounds]
-    harm_limit: float
-
-    @classmethod
-    def from_dict(cls, body: Mapping[str, Any]) -> PeersFigures:
-        """The inverse of `asdict`, also after JSON has made lists of tuples.
-
-        Raises:
-            TypeError, KeyError: fields are missing or unknown.
-        """
-        bounds = {
-            name: {output: Bounds(*values) for output, values in body[name].items()}
-            for name in ("slope", "harm")
-        }
-        return cls(**{**body, **bounds})
-
-    def check(self) -> None:
-        """Refuse a predictor whose agents would respond to effects that are certainly not there.
-
-        Raises:
-            PredictorError: the effect of peers raises the error of an output beyond the limit.
-        """
-        for output, harm in self.harm.items():
-            if harm.value is None or harm.low is None or not harm.low > self.harm_limit:
-                continue
-            raise PredictorError(
-                f"predictor: effect of peers on {output}",
-                f"{100 * harm.value:.0f} % more squared error on held-out data than without it",
-                f"certainly at most {100 * self.harm_limit:g} %",
-                "invented from noise: more data, or a larger identification.block_weight",
-            )
-
-    def verdict(self, output: str) -> str:
-        """What the data say of the peers' effect on an output, in a word or two."""
-        share, slope, harm = self.share[output], self.slope[output], self.harm[output]
-        if harm.low is not None and harm.low > 0.0 and (harm.value or 0.0) > MATERIAL:
-            return "invented"
-        if share is None or share < LEFT_OUT:
-            return "left out"
-        if slope.low is not None and slope.low > UNDERSTATED:
-            return "understated"
-        if harm.high is not None and harm.high < 0.0:
-            return "confirmed"
-        return "unclear"
-
-    def outputs_with(self, verdict: str) -> tuple[str, ...]:
-        """The outputs of which the data say this."""
-        return tuple(output for output in self.share if self.verdict(output) == verdict)
-
-    def describe(self) -> str:
-        """All that is wrong with the effect of the peers, in one line; "" if nothing is."""
-        found = {word: self.outputs_with(word) for word in ("invented", "understated", "left out")}
-        return "; ".join(f"{word}: {', '.join(names)}" for word, names in found.items() if names)
+    value: float
+    low: float
+    high: float
 
 
 @dataclass(frozen=True, slots=True)
 class GateReport:
-    """Figures of a predictor and the limits they are compared with; stored in its file.
+    """Figures of a predictor, stored in its file; `check` holds them against their limits.
 
     Attributes:
         windows: held-out windows predicted.
         rmse: held-out error per output over the horizon, all robots [m, m/s, rad, rad/s].
         rmse_persistence: the same for holding the last measured output.
-        error: scaled error of all outputs together over that of persistence; must be < 1.
-        gain_times: times after the step of force at which the height response is compared [s].
-        gains: predicted over physical height response, per robot and time, of the worst phase.
-        gain_limits: every gain must lie between these.
+        error: scaled error of all outputs together over that of persistence.
+        gains: predicted over physical height response, per robot and time of `GAIN_TIMES`, of the
+            worst phase.
         radius: spectral radius of the iteration of the agents' plans, the worst of all stance
             patterns and phases.
-        radius_limit: must be below this.
-        Q, R: planner weights that the radius was computed for.
-        condition: number of the regression, penalty included; None if it is not known.
-        coupling: norm of the scaled G_ij, the largest of all phases, per robot i and j.
-        size: of G, bytes.
-        cost_probes: tell the QPs that the radius was computed for.
         cost: that the agents minimise: "own", then the plans are best responses; "team".
-        peers: what it says of the effect of peers' forces, against held-out data; None of a single
-            robot.
+        cost_probes: tell the QPs that the radius was computed for.
+        harm: by output, (‖r − p‖² − ‖r‖²) / ‖r‖² on held-out data, where p is the part of a
+            prediction that is due to the peers' forces within the horizon, and r what is measured
+            less all other parts: how much p raises the squared error, negative if it helps. Empty
+            of a single robot, and of less than 1.5 s held out, which tell no interval.
     """
 
     windows: int
-    rmse: dict[str, float]
-    rmse_persistence: dict[str, float]
+    rmse: Mapping[str, float]
+    rmse_persistence: Mapping[str, float]
     error: float
-    gain_times: tuple[float, ...]
     gains: tuple[tuple[float, ...], ...]
-    gain_limits: tuple[float, ...]
     radius: float
-    radius_limit: float
-    Q: tuple[float, ...]
-    R: tuple[float, ...]
-    condition: float | None = None
-    coupling: tuple[tuple[float, ...], ...] = ()
-    size: int = 0
+    cost: str = OWN
     cost_probes: tuple[float, ...] = ()
-    cost: str = "own"
-    peers: PeersFigures | None = None
+    harm: Mapping[str, Bounds] = field(default_factory=dict)
 
     @property
     def iteration(self) -> str:
         """What is iterated, in words."""
-        return "best-response" if self.cost == "own" else "cooperative"
+        return "best-response" if self.cost == OWN else "cooperative"
 
-    def to_dict(self) -> dict[str, Any]:
-        """A dictionary that can be written as JSON."""
-        return asdict(self)
+    def radius_limit(self, config: Config) -> float:
+        """What the radius must be below.
 
-    @classmethod
-    def from_dict(cls, body: dict[str, Any]) -> GateReport:
-        """The inverse of `to_dict`, also after JSON has made lists of tuples.
-
-        Raises:
-            TypeError, KeyError: fields are missing or unknown.
+        Cooperative plans converge wherever it is below 1, bounds or not. Of best responses none
+        knows where bounds are active, hence the margin `identification.max_radius`.
         """
-        frozen: dict[str, Any] = {
-            k: tuple(v) if isinstance(v, list) else v for k, v in body.items()
-        }
-        for table in ("gains", "coupling"):
-            frozen[table] = tuple(tuple(row) for row in frozen[table])
-        if frozen["peers"] is not None:
-            frozen["peers"] = PeersFigures.from_dict(frozen["peers"])
-        return cls(**frozen)
+        return 1.0 if self.cost == TEAM else config.identification.max_radius
 
-    def check(self, kind: str = "distributed") -> None:
+    def check(self, config: Config) -> None:
         """Refuse the predictor if a figure is beyond its limit.
 
-        Args:
-            kind: of planner that will use it; the radius and the effect of peers matter only if
-                its agents respond to each other's plans.
+        The radius and the effect of peers matter only if the agents respond to each other's plans.
 
         Raises:
             PredictorError: a figure is beyond its limit; the message names both.
@@ -201,9 +116,10 @@ class GateReport:
                 "below 1",
                 "too little data, or a plant that the data do not show; collect more",
             )
-        low, high = self.gain_limits
+        limits = config.identification
+        low, high = limits.gain_range
         for robot, row in enumerate(self.gains, start=1):
-            for time, gain in zip(self.gain_times, row, strict=True):
+            for time, gain in zip(GAIN_TIMES, row, strict=True):
                 if not low <= gain <= high:
                     raise PredictorError(
                         f"predictor: height gain of r{robot} at {time:g} s",
@@ -212,77 +128,181 @@ class GateReport:
                         "forces in the data that follow the outputs (feedback bias), "
                         "or a controller stiffer than the interface assumes",
                     )
-        if not find_kind(kind).needs_peers:
+        if not find_kind(config.planner.kind).needs_peers:
             return
-        if not self.radius < self.radius_limit:
+        if not self.radius < self.radius_limit(config):
+            remedy = "leave planner.damping at 0, which chooses it"
+            if self.cost == OWN:
+                remedy = (
+                    "damp them by planner.damping, plan with planner.cost = 'team', or, of a ridge "
+                    "fit, raise identification.block_weight"
+                )
             raise PredictorError(
                 f"predictor: radius of the {self.iteration} map",
                 f"{self.radius:.3f}",
-                f"below {self.radius_limit:g}",
-                "the agents' plans would diverge; "
-                + (
-                    "damp them by planner.damping, plan with planner.cost = 'team', or, of a ridge "
-                    "fit, raise identification.block_weight"
-                    if self.cost == "own"
-                    else "leave planner.damping at 0, which chooses it"
-                ),
+                f"below {self.radius_limit(config):g}",
+                f"the agents' plans would diverge; {remedy}",
             )
-        if self.peers is not None:
-            self.peers.check()
+        for output, harm in self.harm.items():
+            if harm.low > limits.max_peers_harm:
+                raise PredictorError(
+                    f"predictor: effect of peers on {output}",
+                    f"{100 * harm.value:.0f} % more squared error on held-out data than without it",
+                    f"certainly at most {100 * limits.max_peers_harm:g} %",
+                    "invented from noise: more data, or a larger identification.block_weight",
+                )
+
+
+@dataclass(frozen=True, slots=True)
+class Provenance:
+    """Where a team's predictor comes from.
+
+    Attributes:
+        config_digest: of the configuration that the data were collected with.
+        seeds: of the training episodes.
+        samples: of each training episode, at 100 Hz.
+        held_out: samples of each episode held out.
+        versions: of the packages that took part.
+        gates: figures of its gates.
+        fit_seconds: wall-clock time of the fit alone; None: unknown.
+    """
+
+    config_digest: str
+    seeds: tuple[int, ...]
+    samples: tuple[int, ...]
+    held_out: tuple[int, ...]
+    versions: Mapping[str, str]
+    gates: GateReport
+    fit_seconds: float | None = None
+
+    @classmethod
+    def from_dict(cls, body: Mapping[str, Any]) -> Provenance:
+        """The inverse of `asdict`, also after JSON has made lists of tuples.
+
+        Raises:
+            TypeError, KeyError: fields are missing.
+        """
+        gates: dict[str, Any] = dict(body["gates"])
+        gates["gains"] = tuple(tuple(row) for row in gates["gains"])
+        gates["harm"] = {name: Bounds(*three) for name, three in gates.get("harm", {}).items()}
+        report = GateReport(**_fields_of(GateReport, gates))
+        return cls(**_fields_of(cls, {**body, "gates": report}))
+
+
+def _fields_of(kind: type[Any], body: Mapping[str, Any]) -> dict[str, Any]:
+    """The entries that a dataclass has fields for, lists as tuples."""
+    names = {each.name for each in fields(kind)}
+    return {k: tuple(v) if isinstance(v, list) else v for k, v in body.items() if k in names}
+
+
+# ---- files
+
+
+def read(path: Path) -> tuple[Predictor, Provenance]:
+    """Read the predictor of a team, whatever its gates say.
+
+    Raises:
+        PredictorFileError: no such file, not a predictor of a team, or corrupt.
+    """
+    predictor, provenance = load(path)
+    try:
+        return predictor, Provenance.from_dict(provenance)
+    except UNREADABLE as error:
+        raise not_a_predictor(path, error) from None
+
+
+def load_checked(path: Path, config: Config) -> tuple[Predictor, Provenance]:
+    """Read a predictor and refuse any that is not for this team or has not passed its gates.
+
+    The figures are compared with the limits of `config`. If the agents respond to each other's
+    plans, and their QPs are not those that the stored radius is of, it is computed again.
+
+    Raises:
+        PredictorFileError: no such file, not a predictor, corrupt, fitted for another team, gait,
+            horizon, interface or low level.
+        PredictorError: a figure is beyond its gate's limit.
+    """
+    predictor, provenance = read(path)
+    check_fitted_for(config, path, predictor)
+    gates = gates_in_force(provenance.gates, config, predictor)
+    gates.check(config)
+    return predictor, replace(provenance, gates=gates)
+
+
+def check_fitted_for(config: Config, path: Path, predictor: Predictor) -> None:
+    """Refuse a predictor, read from `path`, of another team, gait, horizon or low level.
+
+    Raises:
+        PredictorFileError: it was fitted for another setting.
+    """
+    got, expected = predictor.meta, PredictorMeta.of(config)
+    pairs = [(name, getattr(got, name), getattr(expected, name)) for name in _MATCHED]
+    fitted = dict(got.controller)
+    pairs += [(f"controller.{k}", fitted.get(k), wanted) for k, wanted in expected.controller]
+    for name, stored, wanted in pairs:
+        if stored != wanted:
+            raise PredictorFileError(
+                f"predictor {path}: {name}",
+                repr(stored),
+                f"{wanted!r} as configured",
+                f"fitted for another setting; {REMEDY}",
+            )
+
+
+def gates_in_force(gates: GateReport, config: Config, predictor: Predictor) -> GateReport:
+    """The figures that are stored with a predictor, with the radius of the QPs of `config`."""
+    if not find_kind(config.planner.kind).needs_peers:
+        return gates
+    probes = probe_costs(config, predictor)
+    if are_same_costs(probes, gates.cost_probes):
+        return gates
+    radius = iteration_radius(config, predictor)
+    return replace(gates, radius=radius, cost=cost_of(config), cost_probes=probes)
+
+
+def run_gates(config: Config, predictor: Predictor, held_out: Sequence[Episode]) -> GateReport:
+    """Measure the figures of a predictor on episodes that its fit has not seen.
+
+    Raises:
+        PredictorError: no held-out episode is long enough.
+    """
+    windows, rmse, persistence, error = held_out_error(predictor, held_out)
+    return GateReport(
+        windows=windows,
+        rmse=dict(zip(OUTPUTS, rmse, strict=True)),
+        rmse_persistence=dict(zip(OUTPUTS, persistence, strict=True)),
+        error=error,
+        gains=tuple(tuple(row) for row in height_gains(config, predictor).tolist()),
+        radius=iteration_radius(config, predictor),
+        cost=cost_of(config),
+        cost_probes=probe_costs(config, predictor),
+        harm=peers_harm(predictor, held_out),
+    )
 
 
 # ---- held-out error
 
 
-def window_phases(predictor: Predictor, episode: Episode, windows: int) -> NDArray[np.int64]:
-    """The predictor's phase at the end of each window's past. Shape (windows,)."""
-    meta = predictor.meta
-    ends = episode.first_tick + SAMPLE_MS * (meta.T_ini - 1 + np.arange(windows))
-    phases = [gait_phase(int(t), meta.stand_ms, meta.stance_ms, predictor.phases) for t in ends]
-    return np.array(phases, dtype=np.int64)
-
-
-def predict_windows(predictor: Predictor, phases: NDArray[np.int64], z: Array) -> Array:
-    """Predicted output deviations of windows of `Episode.windows`, each by the G of its phase.
-
-    Args:
-        predictor: of the team.
-        phases: of each window, shape (C,).
-        z: per robot [u_ini; y_ini; u], shape (n, 18 T_ini + 12 N, C).
-
-    Returns:
-        Shape (n, 6 N, C).
-    """
-    meta = predictor.meta
-    y = np.empty((meta.robots, N_OUTPUTS * meta.N, z.shape[2]))
-    for phase in np.unique(phases):
-        now = phases == phase
-        y[:, :, now] = predictor.predict(z[:, :, now], int(phase))
-    return y
-
-
 def squared_errors(predictor: Predictor, held_out: Sequence[Episode]) -> tuple[int, Array, Array]:
-    """Mean squared errors of the windows of all held-out episodes and robots.
+    """Mean squared errors of the windows of all held-out episodes and agents.
 
     Persistence holds the last measured output y, not its deviation.
 
     Returns:
         The number of windows; the errors of the predictor and of persistence, by sample of the
-        horizon and output, shape (N, 6) each.
+        horizon and output, shape (N, p) each.
 
     Raises:
         PredictorError: no held-out episode is long enough for a window.
     """
-    T_ini, N, n = predictor.meta.T_ini, predictor.meta.N, predictor.meta.robots
-    squares, naive, count = np.zeros((N, N_OUTPUTS)), np.zeros((N, N_OUTPUTS)), 0
-    for episode in held_out:
-        if episode.samples < T_ini + N:
-            continue
-        z, dy = episode.windows(T_ini, N)
-        windows = z.shape[2]
-        error = predict_windows(predictor, window_phases(predictor, episode, windows), z) - dy
-        squares += (error.reshape(n, N, N_OUTPUTS, windows) ** 2).sum(axis=(0, 3))
-        future = sliding_window_view(episode.y[T_ini:], N, axis=0)  # (C, n, 6, N)
+    layout = predictor.layout
+    T_ini, N, n, p = layout.T_ini, layout.N, layout.agents, layout.outputs
+    squares, naive, count = np.zeros((N, p)), np.zeros((N, p)), 0
+    for episode, phases, z, dy in _windows(predictor, held_out):
+        windows = len(phases)
+        error = _predict(predictor, phases, z) - dy
+        squares += (error.reshape(n, N, p, windows) ** 2).sum(axis=(0, 3))
+        future = sliding_window_view(episode.y[T_ini:], N, axis=0)  # (C, n, p, N)
         last = episode.y[T_ini - 1 : T_ini - 1 + windows, ..., None]
         naive += ((future - last) ** 2).sum(axis=(0, 1)).T
         count += windows
@@ -299,11 +319,37 @@ def squared_errors(predictor: Predictor, held_out: Sequence[Episode]) -> tuple[i
 def held_out_error(
     predictor: Predictor, held_out: Sequence[Episode]
 ) -> tuple[int, list[float], list[float], float]:
-    """Number of windows, RMSE per output, RMSE of persistence, and the ratio of scaled errors."""
+    """Number of windows, RMSE per output, RMSE of persistence, and the ratio of scaled errors.
+
+    Of any plant: below a ratio of 1 the predictor is of use.
+    """
     count, squares, naive = squared_errors(predictor, held_out)
     rmse, persistence = np.sqrt(squares.mean(axis=0)), np.sqrt(naive.mean(axis=0))
-    ratio = np.linalg.norm(rmse / Y_SCALE) / np.linalg.norm(persistence / Y_SCALE)
+    y_scale = np.array(predictor.layout.y_scale)
+    ratio = np.linalg.norm(rmse / y_scale) / np.linalg.norm(persistence / y_scale)
     return count, rmse.tolist(), persistence.tolist(), float(ratio)
+
+
+def _windows(
+    predictor: Predictor, episodes: Iterable[Episode]
+) -> Iterable[tuple[Episode, NDArray[np.int64], Array, Array]]:
+    """Episodes that are long enough, with each window's phase at the end of its past, z and y."""
+    layout, period = predictor.layout, predictor.meta.period
+    for episode in episodes:
+        if episode.samples >= layout.T_ini + layout.N:
+            z, dy = episode.windows(layout.T_ini, layout.N)
+            ends = layout.T_ini - 1 + np.arange(z.shape[2])
+            since = episode.first_tick + period.sample * ends - period.begin
+            yield episode, since % period.ticks * predictor.phases // period.ticks, z, dy
+
+
+def _predict(predictor: Predictor, phases: NDArray[np.int64], z: Array) -> Array:
+    """Predicted output deviations of windows, each by the G of its phase. Shape (n, p N, C)."""
+    y = np.empty((len(z), predictor.layout.rows, z.shape[2]))
+    for phase in np.unique(phases):
+        now = phases == phase
+        y[:, :, now] = predictor.predict(z[:, :, now], int(phase))
+    return y
 
 
 # ---- height gain and coupling
@@ -315,8 +361,9 @@ def height_gains(config: Config, predictor: Predictor) -> Array:
     Each gain is averaged over the stance patterns of a phase; among the phases the one farthest
     from 1 counts. Shape (n, 2): robot, time of `GAIN_TIMES`.
     """
-    N, n = predictor.meta.N, predictor.meta.robots
-    physical = physical_height(config, predictor.meta.interface, N)
+    layout = predictor.layout
+    N, n = layout.N, layout.agents
+    physical = physical_height(config, N)
     rows = [min(round(1000 * time / SAMPLE_MS), N) - 1 for time in GAIN_TIMES]
     by_phase: dict[int, list[int]] = {}
     for step in walking_steps(config):
@@ -329,13 +376,13 @@ def height_gains(config: Config, predictor: Predictor) -> Array:
             du = np.zeros((N, N_LEGS, 3))
             du[:, :, 2] = _GAIN_FORCE * share
             dy = predictor.future_block(robot, robot, phase) @ du.ravel()
-            gains[k, robot] = dy.reshape(N, N_OUTPUTS)[rows, 0] / physical[rows]
+            gains[k, robot] = dy.reshape(N, layout.outputs)[rows, 0] / physical[rows]
     worst = np.abs(gains - 1.0).argmax(axis=0)
     greatest: Array = np.take_along_axis(gains, worst[None], axis=0)[0]
     return greatest
 
 
-def physical_height(config: Config, interface: str, N: int) -> Array:
+def physical_height(config: Config, N: int) -> Array:
     """Height response to the test force at the ends of N samples. Shape (N,), m.
 
     The low level closes its loop on the height, a = −kp z − kd z' − ki ∫z. "feedforward" adds
@@ -345,7 +392,7 @@ def physical_height(config: Config, interface: str, N: int) -> Array:
     """
     controller, mass = config.controller, config.robot.mass
     passed, share = 1.0, 1.0
-    if interface == "force":
+    if config.planner.interface == "force":
         stiffness = 2.0 * controller.gamma_defect / (controller.gamma_force * mass**2)
         passed = 1.0 / (1.0 + stiffness)
         share = 1.0 - passed
@@ -365,11 +412,11 @@ def physical_height(config: Config, interface: str, N: int) -> Array:
 
 def coupling_table(predictor: Predictor) -> Array:
     """Frobenius norms of the blocks G_ij of the scaled predictor, largest phase. Shape (n, n)."""
-    robots, layout = range(predictor.meta.robots), predictor.meta.layout
+    agents, layout = range(predictor.layout.agents), predictor.layout
     norms = [
         [
-            [np.linalg.norm(scaled_blocks(predictor.block(i, j, phase), layout)) for j in robots]
-            for i in robots
+            [np.linalg.norm(scaled_blocks(predictor.block(i, j, phase), layout)) for j in agents]
+            for i in agents
         ]
         for phase in range(predictor.phases)
     ]
@@ -380,92 +427,118 @@ def coupling_table(predictor: Predictor) -> Array:
 # ---- effect of peers
 
 
-def peers_figures(
-    predictor: Predictor, held_out: Sequence[Episode], harm_limit: float
-) -> PeersFigures | None:
-    """Figures of the predicted effect of the peers' forces; None for a single robot.
+def peers_harm(predictor: Predictor, held_out: Sequence[Episode]) -> dict[str, Bounds]:
+    """How much the predicted effect of the peers' forces raises the squared error, by output.
 
-    No walk is needed twice, so data of real robots will do.
-
-    Args:
-        predictor: whose predictions they are of.
-        held_out: episodes whose forces have random parts, independent between robots.
-        harm_limit: stored with the figures.
+    The forces of the data are random and independent between robots, so that no walk is needed
+    twice, and data of real robots will do. Sums over blocks of windows; the interval is that of the
+    delta method for a ratio of such sums, with Student's t (Cochran, Sampling Techniques, 3rd ed.,
+    section 6.3).
     """
-    n = predictor.meta.robots
-    if n == 1:
-        return None
-    blocks = np.concatenate([_block_sums(predictor, episode) for episode in held_out])
-    pp, pr, rr, own = np.moveaxis(blocks, 1, 0)  # each of shape (blocks, 6)
-    alone = (n - 1) * own.sum(axis=0)
-    nothing = np.full(N_OUTPUTS, np.nan)
-    share = np.sqrt(np.divide(pp.sum(axis=0), alone, out=nothing, where=alone > 0.0)).tolist()
-    return PeersFigures(
-        {name: s if np.isfinite(s) else None for name, s in zip(OUTPUTS, share, strict=True)},
-        dict(zip(OUTPUTS, _ratios(pr, pp), strict=True)),
-        dict(zip(OUTPUTS, _ratios(pp - 2.0 * pr, rr), strict=True)),
-        harm_limit,
-    )
+    layout, blocks = predictor.layout, []
+    if layout.agents == 1:
+        return {}
+    for _, phases, z, dy in _windows(predictor, held_out):
+        peers = _peers_part(predictor, phases, z[:, layout.past :])
+        error = dy - _predict(predictor, phases, z)
+        squares = np.array([error**2, (error + peers) ** 2])
+        by_window = squares.reshape(2, layout.agents, layout.N, layout.outputs, -1).sum(axis=(1, 2))
+        count = max(1, round(len(phases) / _BLOCK))
+        blocks += [part.sum(axis=2) for part in np.array_split(by_window, count, axis=2)]
+    F = len(blocks)
+    if F < 2:
+        return {}
+    whole, without = np.moveaxis(np.array(blocks), 1, 0)  # each of shape (F, 6)
+    more, total = whole - without, without.sum(axis=0)
+    ratio = more.sum(axis=0) / total
+    spread = ((more - ratio * without) ** 2).sum(axis=0) * F / (F - 1)
+    reach = stdtrit(F - 1, _TAIL) * np.sqrt(spread) / total
+    rows = np.stack([ratio, ratio - reach, ratio + reach], axis=1).tolist()
+    return {name: Bounds(*row) for name, row in zip(OUTPUTS, rows, strict=True)}
 
 
-def _block_sums(predictor: Predictor, episode: Episode) -> Array:
-    """Σ p², Σ p r, Σ r² and Σ (own part)² over each block of windows. Shape (blocks, 4, 6)."""
-    meta = predictor.meta
-    if episode.samples < meta.T_ini + meta.N:
-        return np.zeros((0, 4, N_OUTPUTS))
-    z, dy = episode.windows(meta.T_ini, meta.N)
-    phases = window_phases(predictor, episode, z.shape[2])
-    own, peers = _parts(predictor, phases, z[:, meta.past :])
-    rest = dy - predict_windows(predictor, phases, z) + peers
-    products = (peers**2, peers * rest, rest**2, own**2)
-    by_window = np.array(
-        [x.reshape(meta.robots, meta.N, N_OUTPUTS, -1).sum(axis=(0, 1)) for x in products]
-    )
-    count = max(1, round(z.shape[2] / _BLOCK))
-    return np.array([part.sum(axis=2) for part in np.array_split(by_window, count, axis=2)])
-
-
-def _parts(predictor: Predictor, phases: NDArray[np.int64], u: Array) -> tuple[Array, Array]:
-    """Parts of predictions due to a robot's own forces and to its peers', (n, 6 N, C) each.
-
-    Args:
-        predictor: of the team.
-        phases: of each window, shape (C,).
-        u: forces of the horizon, shape (n, 12 N, C).
-    """
-    n, _, windows = u.shape
-    own = np.zeros((n, N_OUTPUTS * predictor.meta.N, windows))
-    peers = np.zeros_like(own)
+def _peers_part(predictor: Predictor, phases: NDArray[np.int64], u: Array) -> Array:
+    """Part of predictions due to the peers' forces u of the horizon, (n, 12 N, C). (n, 6 N, C)."""
+    agents, peers = range(len(u)), np.zeros((len(u), predictor.layout.rows, u.shape[2]))
     for phase in np.unique(phases):
         now = phases == phase
-        for i in range(n):
-            for j in range(n):
-                part = predictor.future_block(i, j, int(phase)) @ u[j][:, now]
-                (own if i == j else peers)[i][:, now] += part
-    return own, peers
+        for i, j in ((i, j) for i in agents for j in agents if i != j):
+            peers[i][:, now] += predictor.future_block(i, j, int(phase)) @ u[j][:, now]
+    return peers
 
 
-def _ratios(over: Array, under: Array) -> list[Bounds]:
-    """Σ over / Σ under of each output, its interval from how much the blocks differ.
+# ---- whether the iteration of the agents' plans converges
 
-    The delta method for a ratio of sums over blocks, with Student's t (Cochran, Sampling
-    Techniques, 3rd ed., section 6.3).
 
-    Args:
-        over: shape (blocks, 6).
-        under: likewise, not negative.
+def best_response_map(config: Config, predictor: Predictor, step: int) -> Array:
+    """The linear map from all agents' present plans to their next, without inequality constraints.
+
+    U_i ← −(1 − d) H_ii⁻¹ G_iiᵀ Q̄ Σ_{j≠i} G_ij U_j + d U_i over the stance legs of planning step
+    `step`, with the G of its phase and the damping d. H_ii is that of the QP that is solved.
+    Shape (s, s), s being the number of stance forces of the team (150 per robot at N = 25).
     """
-    count, total = len(over), under.sum(axis=0)
-    bounds = []
-    for k in range(N_OUTPUTS):
-        if not total[k] > 0.0:
-            bounds.append(Bounds(None, None, None))
-            continue
-        ratio = float(over[:, k].sum() / total[k])
-        if count < 2:
-            bounds.append(Bounds(ratio, None, None))
-            continue
-        spread = ((over[:, k] - ratio * under[:, k]) ** 2).sum() * count / (count - 1)
-        reach = float(stdtrit(count - 1, _TAIL) * np.sqrt(spread) / total[k])
-        bounds.append(Bounds(ratio, ratio - reach, ratio + reach))
-    return bounds
+    phase, problems = phase_of(config, step, predictor.phases), _problems(config, predictor, step)
+    rows = []
+    for i, own in enumerate(problems):
+        coupling = [
+            np.zeros_like(own.H)
+            if i == j
+            else own.gradient @ predictor.future_block(i, j, phase)[:, peer.columns]
+            for j, peer in enumerate(problems)
+        ]
+        factor = linalg.cho_factor(own.H)
+        rows.append(-linalg.cho_solve(factor, np.concatenate(coupling, axis=1)))
+    best, kept = np.concatenate(rows), kept_share(config)
+    return best if kept == 0.0 else (1.0 - kept) * best + kept * np.eye(len(best))
+
+
+def iteration_radius(config: Config, predictor: Predictor) -> float:
+    """Spectral radius of the iteration of the agents' plans, the worst stance pattern and phase.
+
+    Below 1 the one-step-delay iteration of the plans converges; 0 for a single robot.
+    """
+    if predictor.layout.agents == 1:
+        return 0.0
+    if is_cooperative(config):
+        return cooperative_radius(config, predictor)
+    return max(
+        float(np.abs(linalg.eigvals(best_response_map(config, predictor, step))).max())
+        for step in distinct_steps(config, predictor.phases)
+    )
+
+
+def probe_costs(config: Config, predictor: Predictor) -> tuple[float, ...]:
+    """Numbers that tell the QPs that a radius belongs to: Σ pᵀ H p and Σ pᵀ G_uᵀ Q̄ q of each step.
+
+    p and q are fixed, so that any key that changes a cost changes them, whatever it is called.
+    Two numbers for each distinct planning step, of all agents' own QPs, after one that tells
+    cooperative plans from best responses and has their damping; () for a single robot.
+    """
+    if predictor.layout.agents == 1:
+        return ()
+    kept = kept_share(config)
+    probes = [-kept] if kept else []
+    if is_cooperative(config):
+        probes = [-1.0 - max(0.0, config.planner.damping)]
+    for step in distinct_steps(config, predictor.phases):
+        random, hessian, gradient = np.random.default_rng(0), 0.0, 0.0
+        for problem in _problems(config, predictor, step):
+            p, q = (random.uniform(0.5, 1.5, size) for size in problem.gradient.shape)
+            hessian += float(p @ problem.H @ p)
+            gradient += float(p @ problem.gradient @ q)
+        probes += [hessian, gradient]
+    return tuple(probes)
+
+
+def are_same_costs(probes: tuple[float, ...], others: tuple[float, ...]) -> bool:
+    """Whether two results of `probe_costs` are of the same QPs."""
+    return len(probes) == len(others) and np.allclose(probes, others, rtol=_SAME, atol=0.0)
+
+
+def _problems(config: Config, predictor: Predictor, step: int) -> list[PlannerProblem]:
+    """Each agent's QP at a planning step, as the planner builds it."""
+    phase, problems = phase_of(config, step, predictor.phases), []
+    for i in range(predictor.layout.agents):
+        G_u, stance = predictor.future_block(i, i, phase), horizon_stance(config, i, step)
+        problems.append(build_problem(config.planner, config.robot.weight, G_u, stance))
+    return problems

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -33,12 +33,8 @@ def mosaic(signals: Iterable[Array], L: int) -> Array:
     return np.concatenate([hankel(signal, L) for signal in signals if len(signal) >= L], axis=1)
 
 
-@dataclass(frozen=True, slots=True)
-class Split:
-    """Past and future of a data set (eq. 4).
-
-    Shapes: U_p (m T_ini, M), Y_p (p T_ini, M), U_f (m N, M), Y_f (p N, M).
-    """
+class Split(NamedTuple):
+    """Past and future of a data set (eq. 4): (m T_ini, M), (p T_ini, M), (m N, M), (p N, M)."""
 
     U_p: Array
     Y_p: Array
@@ -51,30 +47,6 @@ def split(u: Sequence[Array], y: Sequence[Array], T_ini: int, N: int) -> Split:
     U, Y = mosaic(u, T_ini + N), mosaic(y, T_ini + N)
     m, p = u[0].shape[1], y[0].shape[1]
     return Split(U[: m * T_ini], Y[: p * T_ini], U[m * T_ini :], Y[p * T_ini :])
-
-
-def windows(u: Array, y: Array, T_ini: int, N: int) -> tuple[Array, Array]:
-    """Every window of a signal: a predictor's input and the output it should predict.
-
-    Args:
-        u: inputs, shape (T, n, m).
-        y: outputs, shape (T, n, p).
-        T_ini: samples of the past.
-        N: samples of the horizon.
-
-    Returns:
-        z, shape (n, (m + p) T_ini + m N, C): per agent [u_ini; y_ini; u], time-major;
-        y, shape (n, p N, C); C = T − T_ini − N + 1 windows.
-    """
-    u, y = (
-        # (C, n, dim, L) → (n, L, dim, C)
-        np.transpose(sliding_window_view(x, T_ini + N, axis=0), (1, 3, 2, 0))
-        for x in (u, y)
-    )
-    n, _, _, count = u.shape
-    parts = (u[:, :T_ini], y[:, :T_ini], u[:, T_ini:])
-    z = np.concatenate([part.reshape(n, -1, count) for part in parts], axis=1)
-    return z, y[:, T_ini:].reshape(n, -1, count)
 
 
 def required_samples(m: int, T_ini: int, N: int, n: int) -> int:
@@ -92,7 +64,7 @@ def gram(signals: Sequence[Array], L: int) -> Array:
 
     Each block follows from the one diagonally before it,
     S(a+1, b+1) = S(a, b) + w_{a+M} w_{b+M}ᵀ − w_a w_bᵀ with M columns, so only the first block row
-    needs products over all samples. Episodes shorter than L add no columns.
+    needs products over all samples.
     """
     q = signals[0].shape[1]
     S = np.zeros((L * q, L * q))

@@ -6,30 +6,21 @@ With it a planner knows the coupling as well as anybody can: what a simulator al
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from quadriga.agents.predictor.episode import N_WRENCH, Y_SCALE, wrench_map
-from quadriga.agents.predictor.periodic import DEGREE, polynomials, spread_over_samples
-from quadriga.agents.predictor.predictor import PredictorMeta
-from quadriga.shared.config.sections import Config
+from quadriga.agents.predictor.episode import Layout
+from quadriga.agents.predictor.periodic import DEGREE, Period, polynomials, spread_over_samples
 from quadriga.shared.errors import PredictorFileError
-from quadriga.shared.robots.conventions import N_FORCES, N_OUTPUTS, Array
+from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.atomic import atomic_write
 from quadriga.shared.runtime.npz import UNREADABLE, as_counts, as_measured, open_npz
-from quadriga.shared.topics import SAMPLE_MS
 
-# What a true response depends on, as far as a predictor's meta says it.
-_TEAM: Final = (
-    "robots", "robot", "yokes", "alternate_phase", "stance_ms", "stand_ms", "interface",
-    "controller",
-)  # fmt: skip
-_PLANT: Final = ("motors", "sensors", "estimator")  # sections, what it says nothing of
-_SHOWN: Final = 300  # characters of what the team should have
+_KEY: Final = "identification.response"
 _RANK: Final = 1e-6  # two stance feet have no moment about their own line: no response to that
 
 
@@ -43,7 +34,7 @@ class PulseResponses:
             horizon, shape (P, n, D, N, 12), N, yaw frame.
         y: what the pulse changes, by phase, pulsed robot, direction, sample and responding robot,
             shape (P, n, D, N, n, 6), m, m/s, m/s, rad, rad, rad/s.
-        team: that was measured, see `team_of` and `plant_of`.
+        team: that was measured, see `quadriga.identification.predictors.measured_team`.
     """
 
     ticks: NDArray[np.int64]
@@ -52,40 +43,11 @@ class PulseResponses:
     team: dict[str, Any]
 
 
-def team_of(meta: PredictorMeta) -> dict[str, Any]:
-    """What a team's true response depends on, of what a predictor's meta knows, as JSON has it."""
-    body = meta.to_dict()
-    known: dict[str, Any] = json.loads(json.dumps({name: body[name] for name in _TEAM}))
-    return known
-
-
-def plant_of(config: Config) -> dict[str, Any]:
-    """What a team's true response depends on beside its `team_of`, as JSON has it."""
-    sections = {name: asdict(getattr(config, name)) for name in _PLANT}
-    known: dict[str, Any] = json.loads(json.dumps(sections))
-    return known
-
-
-def check_measured_plant(config: Config) -> None:
-    """Refuse configured responses of a team with other motors, sensors or another estimator.
-
-    Raises:
-        PredictorFileError: no such file, not one of responses, or of another plant.
-    """
-    if config.response_file:
-        _check_team(read_pulse_responses(Path(config.response_file)).team, plant_of(config))
-
-
 def write_pulse_responses(path: Path, responses: PulseResponses) -> None:
     """Keep responses; a file half written never has the name `path`."""
+    arrays = {name: getattr(responses, name) for name in ("ticks", "u", "y")}
     with atomic_write(path) as partial, partial.open("wb") as file:
-        np.savez_compressed(
-            file,
-            ticks=responses.ticks,
-            u=responses.u,
-            y=responses.y,
-            team=json.dumps(responses.team),
-        )
+        np.savez_compressed(file, team=json.dumps(responses.team), **arrays)
 
 
 def read_pulse_responses(path: Path) -> PulseResponses:
@@ -104,34 +66,16 @@ def read_pulse_responses(path: Path) -> PulseResponses:
             return PulseResponses(ticks, u, y, team)
     except UNREADABLE as error:
         raise PredictorFileError(
-            f"identification.response {path}",
+            f"{_KEY} {path}",
             "no such file" if isinstance(error, FileNotFoundError) else type(error).__name__,
             "responses that `quadriga probe --out DIR` wrote",
             "measure them with the same team",
         ) from None
 
 
-def _check_team(measured: dict[str, Any], asked: dict[str, Any]) -> None:
-    """Refuse the responses of another team.
-
-    Raises:
-        PredictorFileError: something differs that responses depend on; it is named.
-    """
-    for name, expected in asked.items():
-        got = measured.get(name)
-        if isinstance(expected, dict) and isinstance(got, dict):
-            changed = [key for key in expected | got if expected.get(key) != got.get(key)]
-            got, expected = ({key: one.get(key) for key in changed} for one in (got, expected))
-        if got != expected:
-            raise PredictorFileError(
-                "identification.response",
-                f"responses of a team with {name} {got}",
-                f"{expected}"[:_SHOWN],
-                "measure this team: `quadriga probe`",
-            )
-
-
-def fit_measured_response(responses: PulseResponses, meta: PredictorMeta) -> Array:
+def fit_measured_response(
+    responses: PulseResponses, layout: Layout, period: Period, wrench: Array
+) -> Array:
     """Coefficients of the response to a sample's wrench, scaled; see `PeriodicFactors.response`.
 
     The response to a pulse of S samples is a polynomial of the phase in each half of the gait's
@@ -140,38 +84,32 @@ def fit_measured_response(responses: PulseResponses, meta: PredictorMeta) -> Arr
 
     Args:
         responses: of the team.
-        meta: of the predictor.
+        layout: of the predictor.
+        period: of the gait.
+        wrench: from the forces of a robot to their net wrench, (w, 12).
 
     Returns:
-        Shape (2 DEGREE + 2, N, n pushing, 6, n responding, 6).
+        Shape (2 DEGREE + 2, N, n pushing, w, n responding, 6).
 
     Raises:
-        PredictorFileError: the responses are those of another team or horizon.
+        PredictorFileError: the responses are those of another number of robots or horizon.
     """
-    n, N, phases = meta.robots, meta.N, len(responses.ticks)
-    _check_team(responses.team, team_of(meta))
-    expected = (phases, n, responses.y.shape[2], N, n, N_OUTPUTS)
-    if responses.y.shape != expected or responses.u.shape != (*expected[:4], N_FORCES):
-        raise PredictorFileError(
-            "identification.response",
-            f"responses of shape {responses.y.shape}",
-            f"{expected}",
-            "measured with another horizon?",
-        )
-    period = 2 * meta.stance_ms
-    values = polynomials(
-        2.0 * np.pi * ((responses.ticks - meta.stand_ms) % period) / period, DEGREE
-    )
-    wrenches = responses.u @ wrench_map(meta.robot).T  # (P, n, D, N, 6)
+    n, N, p, phases = layout.agents, layout.N, layout.outputs, len(responses.ticks)
+    expected = (phases, n, responses.y.shape[2], N, n, p)
+    if responses.y.shape != expected or responses.u.shape != (*expected[:4], layout.inputs):
+        got = f"responses of shape {responses.y.shape}"
+        raise PredictorFileError(_KEY, got, f"{expected}", "another team or horizon?")
+    angles = 2.0 * np.pi * ((responses.ticks - period.begin) % period.ticks) / period.ticks
+    values = polynomials(angles, DEGREE)
+    wrenches = responses.u @ wrench.T  # (P, n, D, N, w)
     if not wrenches.any():
-        raise PredictorFileError("identification.response", "pulses of nothing", "forces")
+        raise PredictorFileError(_KEY, "pulses of nothing", "forces")
     hold = int(np.flatnonzero(np.abs(wrenches).max(axis=(0, 1, 2, 4)))[-1]) + 1
-    g = np.empty((values.shape[1], N, n, N_WRENCH, n, N_OUTPUTS))
+    g = np.empty((values.shape[1], N, n, len(wrench), n, p))
     for j in range(n):
         rows = np.einsum("pk,pdw->pdkw", values, wrenches[:, j, :, 0])
-        answers = responses.y[:, j] / Y_SCALE  # (P, D, N, n, 6)
+        answers = responses.y[:, j] / np.array(layout.y_scale)  # (P, D, N, n, 6)
         count = rows.shape[0] * rows.shape[1]
         found = np.linalg.lstsq(rows.reshape(count, -1), answers.reshape(count, -1), rcond=_RANK)[0]
-        by_lag = found.reshape(values.shape[1], N_WRENCH, N, n, N_OUTPUTS)
-        g[:, :, j] = by_lag.swapaxes(1, 2)
-    return spread_over_samples(g, hold, 2.0 * np.pi * SAMPLE_MS / period)
+        g[:, :, j] = found.reshape(values.shape[1], -1, N, n, p).swapaxes(1, 2)
+    return spread_over_samples(g, hold, period.angle_step)

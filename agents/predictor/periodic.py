@@ -2,24 +2,26 @@
 
 No input acts backwards, and inputs act through fewer numbers w = B u, such as the net wrench of
 four feet. The fit takes three steps, all on scaled signals: responses to w by local projections
-(`sum_folds`, `solve_lags`), which of them are real (`shrink`), and what follows from the past under
+(`estimate_response`), which of them are real (`shrink`), and what follows from the past under
 nominal inputs (`fit_free`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import operator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import reduce
 from itertools import product
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 from scipy import linalg
 
-from quadriga.agents.predictor.episode import Layout
-from quadriga.agents.predictor.regression import factorise
+from quadriga.agents.predictor.episode import Episode, Layout
+from quadriga.agents.predictor.regression import Index, factorise
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robots.conventions import Array
 
@@ -29,7 +31,7 @@ FREE_ORDER: Final = 1  # harmonics of the map from the past
 FOLDS: Final = 10
 _LEAST_FOLDS: Final = 3
 _ROUNDING: Final = 1e-6  # rad: an angle this much before a half begins is meant to be its begin
-_SAME: Final = 1e-9  # N of a robot: inputs that differ by less are held
+_SAME: Final = 1e-9  # inputs of an agent that differ by less are held
 
 # Of the responses.
 _PAST: Final = 6  # samples before a pulse that explain what would have happened without it
@@ -51,18 +53,42 @@ _ON_HARMONICS: Final = (1.0, 10.0)
 _ON_PEERS: Final = (np.inf, 1.0, 30.0)  # infinite: left out
 
 
+@dataclass(frozen=True, slots=True)
+class Period:
+    """After how long a plant repeats itself, in ticks.
+
+    Attributes:
+        ticks: of a period.
+        begin: a tick at which a period begins.
+        sample: ticks of a sample.
+    """
+
+    ticks: int
+    begin: int = 0
+    sample: int = 1
+
+    def angles(self, first_tick: int, count: int) -> Array:
+        """Phases at the starts of samples, the first of which ends at `first_tick`, as angles.
+
+        Shape (count,), rad.
+        """
+        starts = first_tick + self.sample * (np.arange(count) - 1) - self.begin
+        angles: Array = 2.0 * np.pi * (starts % self.ticks) / self.ticks
+        return angles
+
+    @property
+    def angle_step(self) -> float:
+        """δ, what the phase advances in a sample, rad."""
+        return float(np.diff(self.angles(0, 2))[0] % (2.0 * np.pi))
+
+
 # ---- functions of the phase
 
 
 def harmonics(angle: Array, order: int) -> Array:
     """1, √2 cos θ, √2 sin θ, …, √2 cos kθ, √2 sin kθ up to k = `order`: orthonormal over a period.
 
-    Args:
-        angle: θ, the phase as an angle, any shape, rad.
-        order: of the highest harmonic.
-
-    Returns:
-        Shape (*angle.shape, 2 order + 1).
+    Shape (*angle.shape, 2 order + 1).
     """
     k = np.arange(1, order + 1) * angle[..., None]
     waves = np.sqrt(2.0) * np.stack([np.cos(k), np.sin(k)], axis=-1)
@@ -75,10 +101,6 @@ def polynomials(angle: Array, degree: int) -> Array:
     """Legendre polynomials in each half of the period, orthonormal over the period.
 
     Other feet stand in the other half: what a force does jumps from one half to the other.
-
-    Args:
-        angle: θ, the phase as an angle, any shape, rad.
-        degree: of the highest polynomial.
 
     Returns:
         Shape (*angle.shape, 2 degree + 2): those of the first half, then those of the second; each
@@ -110,8 +132,7 @@ class PeriodicFactors:
     """What a periodic G is made of, in physical units but for the scale of w.
 
     Block (t, s) of G_ij at phase θ, which maps the inputs of sample s to the outputs of sample t,
-    is h_{t−s}(θ + s δ) B for t ≥ s and zero before: no input acts backwards. δ is what the phase
-    advances in a sample.
+    is h_{t−s}(θ + s δ) B for t ≥ s and zero before: no input acts backwards.
 
     Attributes:
         response: coefficients of h, what a w of a sample does l samples later, as polynomials of
@@ -178,185 +199,123 @@ class PeriodicFactors:
         return block.reshape(N * outputs, -1)
 
 
-# ---- data
-
-
-class Walked(NamedTuple):
-    """One episode as the regressions see it, scaled.
-
-    Attributes:
-        w: what the inputs act by, a team's net wrenches, (T, n, w).
-        y: outputs, (T, n, p).
-        base: commanded outputs, (T, n, c); a plant without commands has none, c = 0.
-        angle: of the phase in the period at the sample's start, (T,), rad.
-        starts: samples with which a new draw of the inputs' noise begins, in order.
-    """
-
-    w: Array
-    y: Array
-    base: Array
-    angle: Array
-    starts: NDArray[np.int64]
-
-
-def held_samples(inputs: Sequence[Array]) -> int:
-    """For how many samples the inputs are held, everywhere in the data: 1 or more.
-
-    Args:
-        inputs: of each episode, shape (T, n, m).
-    """
-    held = 0
-    for u in inputs:
-        held = int(np.gcd.reduce(np.append(np.diff(_changes(u)), held)))
-    return max(1, held)
-
-
-def draw_starts(u: Array, hold: int) -> NDArray[np.int64]:
-    """Samples with which a draw of the noise begins; none in an episode without noise."""
-    changes = _changes(u)
-    if not len(changes):
-        return changes
-    return np.arange(int(changes[0]) % hold, len(u), hold)
-
-
-def _changes(u: Array) -> NDArray[np.int64]:
-    """Samples whose inputs are not those of the sample before."""
-    flat = u.reshape(len(u), -1)
-    changes: NDArray[np.int64] = 1 + np.flatnonzero(
-        np.abs(np.diff(flat, axis=0)).max(axis=1) > _SAME
-    )
-    return changes
-
-
-def _past_rows(walk: Walked, at: NDArray[np.int64], length: int) -> Array:
-    """[w; y] of the `length` samples before each of the samples `at`, oldest first.
-
-    Shape (len(at), n, length · (w + p)): per agent all w, then all outputs.
-    """
-    places = at[:, None] + np.arange(-length, 0)
-    parts = [
-        np.swapaxes(x[places], 1, 2).reshape(len(at), x.shape[1], -1) for x in (walk.w, walk.y)
-    ]
-    return np.concatenate(parts, axis=2)
-
-
-def _forced(walk: Walked, at: NDArray[np.int64], degree: int) -> Array:
-    """W of all agents at samples `at` times the polynomials there. (len(at), columns)."""
-    w, values = walk.w[at].reshape(len(at), -1), polynomials(walk.angle[at], degree)
-    return (values[:, :, None] * w[:, None, :]).reshape(len(at), -1)
-
-
-def _outputs_of(walk: Walked, at: NDArray[np.int64]) -> Array:
-    """Outputs of all agents at samples `at`. Shape (len(at), p n)."""
-    y: Array = walk.y[at].reshape(len(at), walk.y.shape[1] * walk.y.shape[2])
-    return y
-
-
-def _chunks(
-    walks: Sequence[Walked], first: int, ahead: int, size: int, *, starts: bool
-) -> Iterator[tuple[Walked, NDArray[np.int64]]]:
-    """Samples with `first` samples before them and `ahead` from them on, at most `size` at a time.
-
-    Args:
-        walks: episodes.
-        first: samples needed before.
-        ahead: samples needed from the sample on.
-        size: most samples in one piece.
-        starts: only samples with which a new draw of the noise begins.
-    """
-    for walk in walks:
-        at = np.arange(first, len(walk.w) - ahead + 1)
-        if starts:
-            at = walk.starts[(walk.starts >= first) & (walk.starts <= len(walk.w) - ahead)]
-        for begin in range(0, len(at), size):
-            yield walk, at[begin : begin + size]
-
-
-class Sums(NamedTuple):
-    """Sums over rows of a regression with K regressors z; the third is one of the fit at hand.
-
-    Attributes:
-        zz: Σ z zᵀ, (K, K).
-        zy: Σ z yᵀ for each lag: of responses (N, K, p n), of the map from the past (K, N, n, p).
-        third: of responses Σ z (later draw)ᵀ for each later draw, (draws, K, kw), kw being the
-            regressors of the pulse; of the map from the past Σ y² over all lags, (n, p).
-        rows: how many.
-    """
-
-    zz: Array
-    zy: Array
-    third: Array
-    rows: int
-
-    def plus(self, other: Sums) -> Sums:
-        """The sums over the rows of both."""
-        zz, zy, third = self.zz + other.zz, self.zy + other.zy, self.third + other.third
-        return Sums(zz, zy, third, self.rows + other.rows)
-
-    def less(self, other: Sums) -> Sums:
-        """The sums over the rows of this one that are not the other's."""
-        zz, zy, third = self.zz - other.zz, self.zy - other.zy, self.third - other.third
-        return Sums(zz, zy, third, self.rows - other.rows)
-
-
-# ---- the fit
-
-
-def fit_factors(
-    walks: Sequence[Walked], h: Array, layout: Layout, wrench: Array
+def fit_periodic(
+    episodes: Sequence[Episode],
+    layout: Layout,
+    period: Period,
+    wrench: Array,
+    response: Array | None = None,
 ) -> PeriodicFactors:
     """What G is made of: the responses, and by them what follows from the past.
 
     Args:
-        walks: scaled episodes.
-        h: coefficients of the response to a sample's w, scaled, (k, N, n, w, n, p).
+        episodes: of the plant, with inputs that are random and independent of the outputs, each
+            draw held equally long.
         layout: of the predictor.
-        wrench: from an agent's inputs to what they act by, (w, m).
+        period: after which the plant repeats itself.
+        wrench: B, from an agent's inputs to what they act by, of order one, (w, m).
+        response: coefficients of h, scaled, (k, N, n, w, n, p); None: estimated.
 
     Raises:
-        PredictorError: a singular problem.
+        PredictorError: too little data, or a singular problem.
     """
-    n, y_scale = layout.agents, np.array(layout.y_scale)
-    peers = np.array([[j in layout.members[i] for j in range(n)] for i in range(n)])
-    free = fit_free(walks, h, layout.T_ini, peers)
+    hold = held_samples([episode.deviations()[0] for episode in episodes])
+    walks = [_see(episode, layout, period, wrench, hold) for episode in episodes]
+    h = estimate_response(walks, hold, layout, period.angle_step) if response is None else response
+    free = fit_free(walks, h, layout)
+    y_scale = np.array(layout.y_scale)
     # w keeps its scale.
     columns = np.concatenate([np.ones(len(wrench) * layout.T_ini), np.tile(y_scale, layout.T_ini)])
     physical = free * np.tile(y_scale, layout.N)[:, None] / columns
     return PeriodicFactors(h * y_scale, physical, wrench)
 
 
-def estimate_response(
-    walks: Sequence[Walked], hold: int, layout: Layout, angle_step: float
-) -> Array:
-    """Coefficients of the response to a sample's w, scaled. (k, N, n, w, n, p).
+# ---- data
 
-    Args:
-        walks: scaled episodes.
-        hold: for how many samples each draw of the inputs' noise is held.
-        layout: of the predictor.
-        angle_step: what the phase advances in a sample, rad.
 
-    Raises:
-        PredictorError: too little data.
+class _Walk(NamedTuple):
+    """One episode as the regressions see it, scaled."""
+
+    w: Array  # what the inputs act by, a team's net wrenches, (T, n, w)
+    y: Array  # outputs, (T, n, p)
+    base: Array  # commanded outputs, (T, n, c)
+    angle: Array  # of the phase in the period at the sample's start, (T,), rad
+    starts: Index  # samples with which a new draw of the inputs' noise begins; none without noise
+
+
+def held_samples(inputs: Sequence[Array]) -> int:
+    """For how many samples the inputs (T, n, m) are held, everywhere in the data: 1 or more."""
+    held = 0
+    for u in inputs:
+        held = int(np.gcd.reduce(np.append(np.diff(_changes(u)), held)))
+    return max(1, held)
+
+
+def _see(episode: Episode, layout: Layout, period: Period, wrench: Array, hold: int) -> _Walk:
+    du, dy = episode.deviations()
+    y_scale, changes = np.array(layout.y_scale), _changes(du)
+    starts = np.arange(int(changes[0]) % hold, len(du), hold) if len(changes) else changes
+    base = (episode.y_base / y_scale)[..., list(layout.commanded)]
+    angle = period.angles(episode.first_tick, len(du))
+    return _Walk(du @ wrench.T, dy / y_scale, base, angle, starts)
+
+
+def _changes(u: Array) -> Index:
+    """Samples whose inputs are not those of the sample before."""
+    steps = np.abs(np.diff(u.reshape(len(u), -1), axis=0)).max(axis=1)
+    changes: Index = 1 + np.flatnonzero(steps > _SAME)
+    return changes
+
+
+def _past_rows(walk: _Walk, at: Index, length: int) -> Array:
+    """[w; y] of the `length` samples before each of the samples `at`, oldest first.
+
+    Shape (len(at), n · length · (w + p)): per agent all w, then all outputs.
     """
-    n = layout.agents
-    folds = sum_folds(walks, layout.N, hold)
-    if len(folds) < _LEAST_FOLDS:
-        raise PredictorError(
-            "data for the periodic predictor",
-            f"{sum(fold.rows for fold in folds)} draws of the inputs' noise",
-            "enough to be divided",
-            "collect more: identification.seconds",
-        )
-    total = folds[0]
-    for fold in folds[1:]:
-        total = total.plus(fold)
-    estimate = solve_lags(total, n, hold)
-    without = np.stack([solve_lags(total.less(fold), n, hold) for fold in folds])
-    response, _ = shrink(estimate, without)
-    for i in range(n):
-        response[:, :, layout.strangers(i), :, i] = 0.0
-    return spread_over_samples(response, hold, angle_step)
+    places = at[:, None] + np.arange(-length, 0)
+    parts = [
+        np.swapaxes(x[places], 1, 2).reshape(len(at), x.shape[1], -1) for x in (walk.w, walk.y)
+    ]
+    return np.concatenate(parts, axis=2).reshape(len(at), -1)
+
+
+def _forced(walk: _Walk, at: Index, degree: int) -> Array:
+    """W of all agents at samples `at` times the polynomials there. (len(at), columns)."""
+    w, values = walk.w[at].reshape(len(at), -1), polynomials(walk.angle[at], degree)
+    return (values[:, :, None] * w[:, None, :]).reshape(len(at), -1)
+
+
+def _chunks(
+    walks: Sequence[_Walk], first: int, ahead: int, size: int, *, starts: bool
+) -> Iterator[tuple[_Walk, Index]]:
+    """Samples with `first` samples before them and `ahead` from them on, at most `size` at a time.
+
+    With `starts` only samples with which a new draw of the noise begins.
+    """
+    for walk in walks:
+        last = len(walk.w) - ahead
+        at = np.arange(first, last + 1)
+        if starts:
+            at = walk.starts[(walk.starts >= first) & (walk.starts <= last)]
+        for begin in range(0, len(at), size):
+            yield walk, at[begin : begin + size]
+
+
+class _Sums(NamedTuple):
+    """Sums over rows of a regression with K regressors z; the third is one of the fit at hand.
+
+    Of responses it is Σ z (later draw)ᵀ for each later draw, (draws, K, kw) with kw regressors of
+    the pulse; of the map from the past Σ y² over all lags, (n, p).
+    """
+
+    zz: Array  # Σ z zᵀ, (K, K)
+    zy: Array  # Σ z yᵀ for each lag: of responses (N, K, p n), else (K, N, n, p)
+    third: Array
+    rows: int
+
+
+def _each(operation: Callable[[Any, Any], Any], one: _Sums, other: _Sums) -> _Sums:
+    return _Sums(*map(operation, one, other))
 
 
 # ---- responses: one regression for each lag
@@ -366,37 +325,55 @@ def estimate_response(
 #     y_{t+l} − Σ_s g_{l−s}(θ_{t+s}) w_{t+s} = g_l(θ_t) w_t + c_l z_t + e,   s = S, 2S, … ≤ l,
 #
 # with the later draws' responses subtracted as they are known from smaller lags. z_t holds what
-# came before t. The noise is drawn independently of all that, so g is unbiased whatever z_t leaves
-# out; what z_t explains only lowers the variance. All lags have the same regressors: one
-# factorisation.
+# came before t; draws are independent of it, so that it only lowers the variance of g. All lags
+# have the same regressors: one factorisation.
 
 
-def sum_folds(walks: Sequence[Walked], N: int, hold: int) -> list[Sums]:
-    """Sums of the regression over `FOLDS` parts of the walks, one after the other in time.
+def estimate_response(
+    walks: Sequence[_Walk], hold: int, layout: Layout, angle_step: float
+) -> Array:
+    """Coefficients of the response to a sample's w, scaled. (k, N, n, w, n, p).
 
-    Args:
-        walks: scaled episodes.
-        N: lags.
-        hold: for how many samples each draw of the noise is held, S.
+    Raises:
+        PredictorError: too little data.
     """
+    n = layout.agents
+    folds = _sum_folds(walks, layout.N, hold)
+    if len(folds) < _LEAST_FOLDS:
+        raise PredictorError(
+            "data for the periodic predictor",
+            f"{sum(fold.rows for fold in folds)} draws of the inputs' noise",
+            "enough to be divided",
+            "collect more: identification.seconds",
+        )
+    total = reduce(lambda one, other: _each(operator.add, one, other), folds)
+    estimate = _solve_lags(total, n, hold)
+    without = np.stack([_solve_lags(_each(operator.sub, total, fold), n, hold) for fold in folds])
+    response, _ = shrink(estimate, without)
+    for i, members in enumerate(layout.members):
+        response[:, :, [j for j in range(n) if j not in members], :, i] = 0.0
+    return spread_over_samples(response, hold, angle_step)
+
+
+def _sum_folds(walks: Sequence[_Walk], N: int, hold: int) -> list[_Sums]:
+    """Sums of the regression over `FOLDS` parts of the walks, one after the other in time."""
     total = sum(len(at) for _, at in _chunks(walks, _PAST, N, _ROWS, starts=True))
     size = max(1, min(_ROWS, -(-total // FOLDS)))
-    folds: list[Sums | None] = [None] * FOLDS
+    folds: dict[int, _Sums] = {}
     seen = 0
     for walk, at in _chunks(walks, _PAST, N, size, starts=True):
-        fold = min(FOLDS - 1, seen * FOLDS // max(total, 1))
-        part, before = _sum_response_rows(walk, at, N, hold), folds[fold]
-        folds[fold] = part if before is None else before.plus(part)
+        fold, part = min(FOLDS - 1, seen * FOLDS // total), _sum_response_rows(walk, at, N, hold)
+        folds[fold] = _each(operator.add, folds[fold], part) if fold in folds else part
         seen += len(at)
-    return [fold for fold in folds if fold is not None]
+    return [*folds.values()]
 
 
-def _sum_response_rows(walk: Walked, at: NDArray[np.int64], N: int, hold: int) -> Sums:
+def _sum_response_rows(walk: _Walk, at: Index, N: int, hold: int) -> _Sums:
     pulse = _forced(walk, at, DEGREE)
     ahead = at[:, None] + np.linspace(0, N, _COMMANDS + 1).astype(int)[1:] - 1
     commands = walk.base[ahead] - walk.base[at - 1][:, None]
     regressors = [
-        _past_rows(walk, at, _PAST).reshape(len(at), -1),
+        _past_rows(walk, at, _PAST),
         harmonics(walk.angle[at], _MEAN_ORDER),
         commands[:, :, 0].reshape(len(at), -1),
         pulse,
@@ -405,18 +382,12 @@ def _sum_response_rows(walk: Walked, at: NDArray[np.int64], N: int, hold: int) -
     later = [_forced(walk, at + s, DEGREE) for s in range(hold, N, hold)]
     kw = pulse.shape[1]
     zw = np.stack([z.T @ w for w in later]) if later else np.zeros((0, z.shape[1], kw))
-    zy = np.stack([z.T @ _outputs_of(walk, at + lag) for lag in range(N)])
-    return Sums(z.T @ z, zy, zw, len(at))
+    zy = np.stack([z.T @ walk.y[at + lag].reshape(len(at), -1) for lag in range(N)])
+    return _Sums(z.T @ z, zy, zw, len(at))
 
 
-def solve_lags(sums: Sums, n: int, hold: int) -> Array:
-    """Coefficients of the responses g to a held draw. Shape (2 DEGREE + 2, N, n, w, n, p).
-
-    Axes: polynomial, lag, agent that pushes, component, agent that responds, output.
-
-    Raises:
-        PredictorError: a singular problem.
-    """
+def _solve_lags(sums: _Sums, n: int, hold: int) -> Array:
+    """Coefficients of the responses g to a held draw. Shape (2 DEGREE + 2, N, n, w, n, p)."""
     N, K, outputs = sums.zy.shape
     kw = sums.third.shape[2]
     penalised = sums.zz.copy(order="F")
@@ -459,9 +430,8 @@ def spread_over_samples(g: Array, hold: int, angle_step: float) -> Array:
 # ---- which responses of peers are real
 #
 # Every fold of the data gives an estimate of its own (by the jackknife). Products of the estimates
-# of two different folds have the square of the true response as their mean, so they tell a response
-# from noise without knowing the noise; how far the folds scatter tells how much of a response's
-# square is noise.
+# of two folds have the square of the true response as their mean, whatever the noise; how far the
+# folds scatter tells how much of a response's square is noise.
 
 
 def shrink(estimate: Array, without: Array) -> tuple[Array, NDArray[np.bool_]]:
@@ -509,61 +479,58 @@ def _is_significant(folds: Array) -> NDArray[np.bool_]:
 
 # ---- what follows from the past
 #
-# What the inputs of the horizon do is subtracted first, by the responses already known. The
-# penalties are chosen for each output by the error on the last part of the data, from a fit to the
-# rest.
+# What the inputs of the horizon do is subtracted first. The penalties are chosen for each output by
+# the error on the last part of the data, from a fit to the rest.
 
 
-def fit_free(walks: Sequence[Walked], h: Array, T_ini: int, peers: NDArray[np.bool_]) -> Array:
-    """The map as harmonics. Shape (2 FREE_ORDER + 1, n responding, n, p N, (w + p) T_ini).
-
-    Args:
-        walks: scaled episodes.
-        h: coefficients of the response to a sample's w, (k, N, n, w, n, p).
-        T_ini: samples of the past.
-        peers: whose past may matter to whom, (n responding, n).
-
-    Raises:
-        PredictorError: a singular problem.
-    """
-    train, rest = _sum_free_parts(walks, h, T_ini)
-    both = train.plus(rest)
+def fit_free(walks: Sequence[_Walk], h: Array, layout: Layout) -> Array:
+    """The map as harmonics. Shape (2 FREE_ORDER + 1, n responding, n, p N, (w + p) T_ini)."""
+    train, rest = _sum_free_parts(walks, h, layout.T_ini)
+    both = _each(operator.add, train, rest)
     waves, (_, N, n, w, _, p) = 2 * FREE_ORDER + 1, h.shape
-    width = (w + p) * T_ini
+    width = (w + p) * layout.T_ini
     wave, agent, _ = np.indices((waves, n, width)).reshape(3, -1)
     x = np.zeros((n, p, waves * n * width, N))
-    for i in range(n):
-        columns = np.flatnonzero(peers[i][agent] | (agent == i))
-        candidates = _penalties(agent[columns] == i, wave[columns] > 0)
-        for penalty, outputs in _choose_penalties(train, rest, i, candidates, columns):
-            solution = _solve_free(both, i, penalty, columns, outputs)
+    for i, members in enumerate(layout.members):
+        columns = np.flatnonzero(np.isin(agent, members))
+        own, harmonic = agent[columns] == i, wave[columns] > 0
+        candidates = [
+            ridge * np.where(harmonic, on_harmonics, 1.0) * np.where(own, 1.0, on_peers)
+            for on_peers, ridge, on_harmonics in product(
+                _ON_PEERS[:1] if own.all() else _ON_PEERS, _RIDGES, _ON_HARMONICS
+            )
+        ]
+        best = _choose_penalties(train, rest, i, candidates, columns)
+        for k in np.unique(best):
+            outputs = np.flatnonzero(best == k)
+            solution = _solve_free(both, i, candidates[k], columns, outputs)
             for place, output in enumerate(outputs):
                 x[i, output, columns] = solution[:, :, place]
     blocks = x.reshape(n, p, waves, n, width, N).transpose(2, 0, 3, 5, 1, 4)
     return blocks.reshape(waves, n, n, N * p, width)
 
 
-def _sum_free_parts(walks: Sequence[Walked], h: Array, T_ini: int) -> tuple[Sums, Sums]:
+def _sum_free_parts(walks: Sequence[_Walk], h: Array, T_ini: int) -> tuple[_Sums, _Sums]:
     """Sums over the first part of the rows and over the last."""
     _, N, n, w, _, p = h.shape
     K = (2 * FREE_ORDER + 1) * n * (w + p) * T_ini
     total = sum(len(at) for _, at in _chunks(walks, T_ini, N, _FREE_ROWS, starts=False))
-    parts = [Sums(np.zeros((K, K)), np.zeros((K, N, n, p)), np.zeros((n, p)), 0)] * 2
+    parts = [_Sums(np.zeros((K, K)), np.zeros((K, N, n, p)), np.zeros((n, p)), 0)] * 2
     seen = 0
     for walk, at in _chunks(walks, T_ini, N, _FREE_ROWS, starts=False):
-        part = int(seen >= (1.0 - _HELD_OUT) * total)
-        past = _past_rows(walk, at, T_ini).reshape(len(at), -1)
-        waves = harmonics(walk.angle[at], FREE_ORDER)
+        past, waves = _past_rows(walk, at, T_ini), harmonics(walk.angle[at], FREE_ORDER)
         z = (waves[:, :, None] * past[:, None, :]).reshape(len(at), -1)
-        y = np.stack([_outputs_of(walk, at + lag) for lag in range(N)], axis=1)
+        y = np.stack([walk.y[at + lag].reshape(len(at), -1) for lag in range(N)], axis=1)
         y = (y - _forced_outputs(walk, at, h)).reshape(len(at), -1)
         yy = (y**2).sum(axis=0).reshape(N, n, p).sum(axis=0)
-        parts[part] = parts[part].plus(Sums(z.T @ z, (z.T @ y).reshape(K, N, n, p), yy, len(at)))
+        here = _Sums(z.T @ z, (z.T @ y).reshape(K, N, n, p), yy, len(at))
+        part = int(seen >= (1.0 - _HELD_OUT) * total)
+        parts[part] = _each(operator.add, parts[part], here)
         seen += len(at)
     return parts[0], parts[1]
 
 
-def _forced_outputs(walk: Walked, at: NDArray[np.int64], h: Array) -> Array:
+def _forced_outputs(walk: _Walk, at: Index, h: Array) -> Array:
     """What w from samples `at` on does to the outputs there. Shape (len(at), N, p n)."""
     count, N, n, components, _, p = h.shape
     rows = h.transpose(1, 0, 2, 3, 4, 5).reshape(N, count * n * components, n * p)
@@ -575,30 +542,16 @@ def _forced_outputs(walk: Walked, at: NDArray[np.int64], h: Array) -> Array:
     return y
 
 
-def _penalties(own: NDArray[np.bool_], harmonic: NDArray[np.bool_]) -> list[Array]:
-    """Candidates for the penalties per row on the regressors of one agent's outputs.
-
-    Args:
-        own: regressors that are the agent's own.
-        harmonic: regressors that change with the phase.
-    """
-    weights = _ON_PEERS[:1] if own.all() else _ON_PEERS
-    return [
-        ridge * np.where(harmonic, on_harmonics, 1.0) * np.where(own, 1.0, on_peers)
-        for on_peers, ridge, on_harmonics in product(weights, _RIDGES, _ON_HARMONICS)
-    ]
-
-
 def _choose_penalties(
-    train: Sums, rest: Sums, i: int, candidates: list[Array], columns: NDArray[np.int64]
-) -> list[tuple[Array, list[int]]]:
-    """Each penalty that is best for some of agent `i`'s outputs, and those outputs.
+    train: _Sums, rest: _Sums, i: int, candidates: list[Array], columns: Index
+) -> Index:
+    """The best candidate for each of agent `i`'s outputs.
 
     Peers count only where they lower the error by more than chance does.
     """
-    every = list(range(train.zy.shape[3]))
+    every = np.arange(train.zy.shape[3])
     if not (train.rows and rest.rows):
-        return [(candidates[0], every)]
+        return np.zeros_like(every)
     zz, zy = rest.zz[np.ix_(columns, columns)], rest.zy[columns, :, i]
     errors = []
     for penalty in candidates:
@@ -607,13 +560,11 @@ def _choose_penalties(
         errors.append(rest.third[i] + squares.sum(axis=(0, 1)))
     table, alone = np.array(errors), len(_RIDGES) * len(_ON_HARMONICS)
     table[alone:] /= _WORTH**2
-    best = np.argmin(table, axis=0)
-    return [(candidates[k], np.flatnonzero(best == k).tolist()) for k in np.unique(best)]
+    best: Index = np.argmin(table, axis=0)
+    return best
 
 
-def _solve_free(
-    sums: Sums, i: int, penalty: Array, columns: NDArray[np.int64], outputs: list[int]
-) -> Array:
+def _solve_free(sums: _Sums, i: int, penalty: Array, columns: Index, outputs: Index) -> Array:
     """Solution for some outputs of agent `i`. Shape (len(columns), N, len(outputs))."""
     counted = np.isfinite(penalty)
     some = columns[counted]

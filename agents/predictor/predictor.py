@@ -1,22 +1,48 @@
-"""G, the data-driven state-transition matrix over N steps (eq. 6), and its blocks (eq. 9)."""
+"""G, the data-driven state-transition matrix over N steps (eq. 6), its blocks (eq. 9), its fits."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from quadriga.agents.predictor.episode import Layout, everyone, team_layout
-from quadriga.agents.predictor.periodic import PeriodicFactors
+from quadriga.agents.predictor.episode import (
+    Episode,
+    Layout,
+    as_signal,
+    check_episodes,
+    everyone,
+    team_layout,
+    wrench_map,
+)
+from quadriga.agents.predictor.measured_response import fit_measured_response, read_pulse_responses
+from quadriga.agents.predictor.periodic import Period, PeriodicFactors, fit_periodic
+from quadriga.agents.predictor.regression import (
+    check_excitation,
+    normal_equations,
+    solve_pinv,
+    solve_ridge,
+    to_physical,
+)
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.yokes import neighbours
-from quadriga.shared.errors import PredictorError
-from quadriga.shared.robots.conventions import N_FORCES, N_OUTPUTS, Array
+from quadriga.shared.errors import PredictorError, did_you_mean
+from quadriga.shared.robots.conventions import Array
+from quadriga.shared.topics import SAMPLE_MS
 
+KINDS: Final = ("pinv", "ridge", "periodic")  # of fits
 # Keys of the controller that act only in a failure and do not change the plant that is fitted.
 _SAFETY_KEYS: Final = ("damping", "fall_tilt", "max_failures")
+_KEYS: Final = {  # of the configuration, in the meta under their own names
+    "team": ("robots", "robot", "yokes", "alternate_phase"),
+    "planner": ("N", "T_ini", "interface"),
+    "gait": ("stance_ms", "stand_ms"),
+    "identification": ("neighbours", "ridge", "block_weight"),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,71 +50,77 @@ class PredictorMeta:
     """The team and settings that a predictor was fitted for, and how; it fits no others.
 
     Attributes:
-        kind: name of the fit, a key of `quadriga.agents.predictor.fits.FITS`.
-        phases: parts of the gait's period with a G of their own (see `time_grid.gait_phase`).
+        kind: name of the fit, one of `KINDS`.
+        phases: parts of the period with a G of their own (see `time_grid.gait_phase`).
         neighbours: "all", or "yoked": G_ij is zero unless i and j are yoked.
         controller: the low level, which is part of G.
         stand_ms: where the gait's period, and with it phase 0, begins.
         response: of 'periodic': the file of measured responses that stands for fitted ones.
+        plant: layout of a plant that is no team: what belongs to robots and gait is empty.
     """
 
     robots: int
-    robot: str
     N: int
     T_ini: int
-    interface: str
-    yokes: str
-    alternate_phase: bool
-    stance_ms: int
-    stand_ms: int
-    controller: tuple[tuple[str, float | str | bool], ...]
     kind: str
     phases: int
-    neighbours: str
     ridge: float
     block_weight: float
+    robot: str = ""
+    interface: str = ""
+    yokes: str = "complete"
+    alternate_phase: bool = False
+    stance_ms: int = 0
+    stand_ms: int = 0
+    controller: tuple[tuple[str, float | str | bool], ...] = ()
+    neighbours: str = "all"
     response: str = ""
+    plant: Layout | None = None
 
     @classmethod
     def of(cls, config: Config) -> PredictorMeta:
         """The meta of a predictor fitted for `config`."""
+        known: dict[str, Any] = {
+            key: getattr(getattr(config, section), key)
+            for section, keys in _KEYS.items()
+            for key in keys
+        }
         controller = {k: v for k, v in asdict(config.controller).items() if k not in _SAFETY_KEYS}
-        ident = config.identification
         return cls(
-            robots=config.team.robots,
-            robot=config.team.robot,
-            N=config.planner.N,
-            T_ini=config.planner.T_ini,
-            interface=config.planner.interface,
-            yokes=config.team.yokes,
-            alternate_phase=config.team.alternate_phase,
-            stance_ms=config.gait.stance_ms,
-            stand_ms=config.gait.stand_ms,
-            controller=tuple(sorted(controller.items())),
-            kind=ident.predictor,
+            kind=config.identification.predictor,
             phases=1,
-            neighbours=ident.neighbours,
-            ridge=ident.ridge,
-            block_weight=ident.block_weight,
+            controller=tuple(sorted(controller.items())),
             response=config.response_file,
+            **known,
         )
 
     def to_dict(self) -> dict[str, Any]:
         """A dictionary that can be written as JSON."""
-        return asdict(self) | {"controller": dict(self.controller)}
+        body = asdict(self) | {"controller": dict(self.controller)}
+        if self.plant is None:
+            del body["plant"]
+        return body
 
     @classmethod
     def from_dict(cls, body: dict[str, Any]) -> PredictorMeta:
-        """The inverse of `to_dict`.
+        """The inverse of `to_dict`, also after JSON has made lists of tuples.
 
         Raises:
             TypeError, AttributeError, KeyError: fields are missing, unknown or of another type.
         """
-        return cls(**body | {"controller": tuple(sorted(body["controller"].items()))})
+        changes: dict[str, Any] = {"controller": tuple(sorted(body["controller"].items()))}
+        if "plant" in body:
+            given = body["plant"]
+            members = tuple(tuple(agents) for agents in given["members"])
+            scales = {name: tuple(given[name]) for name in ("u_scale", "y_scale", "commanded")}
+            changes["plant"] = Layout(**given | scales | {"members": members})
+        return cls(**body | changes)
 
     @property
     def layout(self) -> Layout:
         """Sizes, scales and members of the predictor, as the numerics take them."""
+        if self.plant is not None:
+            return self.plant
         n, members = self.robots, everyone(self.robots)
         if self.neighbours != "all":
             yoked = (neighbours(n, self.yokes, i) for i in range(n))
@@ -96,14 +128,21 @@ class PredictorMeta:
         return team_layout(n, self.T_ini, self.N, members)
 
     @property
+    def period(self) -> Period:
+        """After how long the plant repeats itself: two stance times, or that of the plant."""
+        if self.plant is not None:
+            return Period(self.phases)
+        return Period(2 * self.stance_ms, self.stand_ms, SAMPLE_MS)
+
+    @property
     def width(self) -> int:
-        """Columns of a block: length of one robot's [u_ini; y_ini; u]."""
-        return self.past + N_FORCES * self.N
+        """Columns of a block: length of one agent's [u_ini; y_ini; u]."""
+        return self.layout.width
 
     @property
     def past(self) -> int:
         """Columns of a block that belong to [u_ini; y_ini]."""
-        return (N_FORCES + N_OUTPUTS) * self.T_ini
+        return self.layout.past
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,11 +151,11 @@ class Predictor:
 
     Attributes:
         meta: what it was fitted for.
-        parts: G itself, shape (P, n, n, 6 N, 18 T_ini + 12 N), read-only, one for each of the P
-            phases; rows and columns are time-major (sample 0's twelve forces, sample 1's twelve,
-            …), N and m, m/s, rad, rad/s. Or the factors of a periodic one, of which blocks are
-            expanded when they are asked for.
-        condition: number of the regression it was fitted by, penalty included; None: unknown.
+        parts: G itself, shape (P, n, n, p N, W), read-only, one for each of the P phases; rows and
+            columns are time-major (sample 0's inputs, sample 1's, …), of robots N and m, m/s, rad,
+            rad/s. Or the factors of a periodic one, of which blocks are expanded when they are
+            asked for.
+        layout: its sizes and scales, those of the meta.
 
     Raises:
         PredictorError: arrays of other shapes.
@@ -124,17 +163,25 @@ class Predictor:
 
     meta: PredictorMeta
     parts: Array | PeriodicFactors
-    condition: float | None = None
+    layout: Layout = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        if isinstance(self.parts, PeriodicFactors):
-            self.parts.check(self.meta.layout)
+        parts = self.parts
+        agents = (
+            parts.response.shape[2:3] if isinstance(parts, PeriodicFactors) else parts.shape[1:2]
+        )
+        if agents != (self.meta.robots,):  # before the layout: a file may claim any number
+            raise PredictorError("predictor", f"arrays of {agents} agents", f"{self.meta.robots}")
+        layout = self.meta.layout
+        object.__setattr__(self, "layout", layout)
+        if isinstance(parts, PeriodicFactors):
+            parts.check(layout)
             return
-        n = self.meta.robots
-        expected = (self.meta.phases, n, n, N_OUTPUTS * self.meta.N, self.meta.width)
-        if self.parts.shape != expected:
-            raise PredictorError("predictor.G", f"shape {self.parts.shape}", f"{expected}")
-        self.parts.setflags(write=False)
+        n = layout.agents
+        expected = (self.phases, n, n, layout.rows, layout.width)
+        if parts.shape != expected:
+            raise PredictorError("predictor.G", f"shape {parts.shape}", f"{expected}")
+        parts.setflags(write=False)
 
     @property
     def phases(self) -> int:
@@ -143,59 +190,82 @@ class Predictor:
 
     @property
     def G(self) -> Array:
-        """All blocks at once, (P, n, n, 6 N, W); large if it is periodic."""
+        """All blocks at once, (P, n, n, p N, W); large if it is periodic."""
         if not isinstance(self.parts, PeriodicFactors):
             return self.parts
-        robots, phases = range(self.meta.robots), range(self.phases)
-        return np.array([[[self.block(i, j, p) for j in robots] for i in robots] for p in phases])
+        agents, phases = range(self.layout.agents), range(self.phases)
+        return np.array([[[self.block(i, j, p) for j in agents] for i in agents] for p in phases])
 
     def block(self, i: int, j: int, phase: int = 0) -> Array:
-        """G_ij of a phase, the effect of agent j on agent i. Shape (6 N, 18 T_ini + 12 N)."""
+        """G_ij of a phase, the effect of agent j on agent i. Shape (p N, W)."""
         if isinstance(self.parts, PeriodicFactors):
             return self.parts.block(i, j, phase, self.phases)
         block: Array = self.parts[phase, i, j]
         return block
 
     def future_block(self, i: int, j: int, phase: int = 0) -> Array:
-        """The columns of G_ij that multiply the future forces. Shape (6 N, 12 N)."""
+        """The columns of G_ij that multiply the future inputs. Shape (p N, m N)."""
         if isinstance(self.parts, PeriodicFactors):
             return self.parts.future_block(i, j, phase, self.phases)
-        block: Array = self.parts[phase, i, j, :, self.meta.past :]
+        block: Array = self.parts[phase, i, j, :, self.layout.past :]
         return block
 
-    def row(self, i: int, phase: int = 0) -> Array:
-        """Blocks G_i1 … G_in side by side. Shape (6 N, n (18 T_ini + 12 N))."""
-        robots = range(self.meta.robots)
-        return np.concatenate([self.block(i, j, phase) for j in robots], axis=1)
-
     def couples(self, i: int, j: int) -> bool:
-        """Whether anything that robot j does has an effect on robot i."""
+        """Whether anything that agent j does has an effect on agent i."""
         if isinstance(self.parts, PeriodicFactors):
             return self.parts.couples(i, j)
         return bool(self.parts[:, i, j].any())
-
-    @property
-    def nbytes(self) -> int:
-        """Memory of what it is made of."""
-        return sum(array.nbytes for array in self.arrays().values())
 
     def arrays(self) -> Mapping[str, Array]:
         """What it is made of, by name: with the meta all that a file must hold."""
         return self.parts.arrays() if isinstance(self.parts, PeriodicFactors) else {"G": self.parts}
 
     def predict(self, z: Array, phase: int = 0) -> Array:
-        """Predicted output deviations of the whole team.
+        """Predicted output deviations of all agents.
 
         Args:
-            z: per robot [u_ini; y_ini; u], shape (n, 18 T_ini + 12 N) or, for many windows
-                at once, (n, 18 T_ini + 12 N, C).
+            z: per agent [u_ini; y_ini; u], shape (n, W) or, for many windows at once, (n, W, C).
             phase: that the end of [u_ini; y_ini] lies in.
 
         Returns:
-            Shape (n, 6 N) or (n, 6 N, C).
+            Shape (n, p N) or (n, p N, C).
         """
-        stacked = z.reshape(-1, *z.shape[2:])
-        return np.stack([self.row(i, phase) @ stacked for i in range(self.meta.robots)])
+        stacked, agents = z.reshape(-1, *z.shape[2:]), range(self.layout.agents)
+        rows = (np.concatenate([self.block(i, j, phase) for j in agents], axis=1) for i in agents)
+        return np.stack([row @ stacked for row in rows])
+
+    def forecast(
+        self, past_u: ArrayLike, past_y: ArrayLike, future_u: ArrayLike, phase: int = 0
+    ) -> Array:
+        """Predicted output deviations over the horizon, sample by sample.
+
+        Args:
+            past_u: the last T_ini inputs, oldest first, shape (T_ini, m), or (T_ini, n, m).
+            past_y: the outputs that belong to them, shape (T_ini, p), or (T_ini, n, p).
+            future_u: inputs of the horizon, shape (N, m), or (N, n, m).
+            phase: number of the horizon's first sample, of a periodic plant.
+
+        Returns:
+            Shape (N, p), or (N, n, p).
+
+        Raises:
+            PredictorError: another shape.
+        """
+        layout = self.layout
+        n, m, p = layout.agents, layout.inputs, layout.outputs
+        parts = []
+        for name, values, shape in (
+            ("past_u", past_u, (layout.T_ini, n, m)),
+            ("past_y", past_y, (layout.T_ini, n, p)),
+            ("future_u", future_u, (layout.N, n, m)),
+        ):
+            signal = as_signal(name, values)
+            if signal.shape != shape:
+                raise PredictorError(name, f"shape {signal.shape}", f"{shape}")
+            parts.append(signal.transpose(1, 0, 2).reshape(n, -1))
+        y = self.predict(np.concatenate(parts, axis=1), phase % self.phases)
+        forecast: Array = y.reshape(n, layout.N, p).transpose(1, 0, 2)
+        return forecast[:, 0] if np.ndim(future_u) == 2 else forecast
 
 
 def check_sizes(config: Config, predictor: Predictor) -> None:
@@ -211,3 +281,110 @@ def check_sizes(config: Config, predictor: Predictor) -> None:
         raise PredictorError(
             "predictor", f"(robots, N, T_ini) = {got}", f"{expected}", "of another team?"
         )
+
+
+# ---- fits
+
+
+def fit(episodes: Sequence[Episode], meta: PredictorMeta, wrench: Array | None = None) -> Predictor:
+    """The fit that `meta.kind` names.
+
+    - pinv: G = Y_f [U_p; Y_p; U_f]† (eq. 6).
+    - ridge: row i minimises ‖Y_f^i − Σ_j G_ij Z_j‖² + ridge · M · (‖G_ii‖² + w² Σ_{j≠i} ‖G_ij‖²)
+      with M columns: effects that the data do not clearly show are not attributed to the peers.
+      Without this weight the agents' best responses to each other's last plans diverge.
+    - periodic: a function of the phase in which no input acts backwards, see `periodic`; of a team
+      that of the gait, with peers by their net wrench. Measured responses stand for fitted ones if
+      there is a file of them.
+
+    Args:
+        episodes: of the plant.
+        meta: what is fitted.
+        wrench: of `periodic`, from an agent's inputs to what they act by, (w, m); None: of the
+            robot.
+
+    Raises:
+        PredictorError: no data, too little, of another plant, or a singular problem.
+        PredictorFileError: the file of measured responses cannot be read, or is another team's.
+    """
+    layout = meta.layout
+    if meta.kind == "periodic":
+        check_episodes(episodes, layout)
+        B = wrench_map(meta.robot) if wrench is None else wrench
+        response = None
+        if meta.response:
+            measured = read_pulse_responses(Path(meta.response))
+            response = fit_measured_response(measured, layout, meta.period, B)
+        factors = fit_periodic(episodes, layout, meta.period, B, response)
+        phases = max(1, meta.period.ticks // meta.period.sample)
+        return Predictor(replace(meta, phases=phases), factors)
+    regression = normal_equations(episodes, layout)
+    if meta.kind == "pinv":
+        meta = replace(meta, phases=1, ridge=0.0, block_weight=1.0)
+        x = solve_pinv(regression, layout)
+    else:
+        meta = replace(meta, phases=1)
+        x = solve_ridge(regression, layout, meta.ridge, meta.block_weight)
+    return Predictor(meta, to_physical(x, layout)[None])
+
+
+def fit_plant(
+    episodes: Sequence[Episode],
+    kind: str = "pinv",
+    T_ini: int = 4,
+    N: int = 30,
+    *,
+    ridge: float = 1e-6,
+    block_weight: float = 1.0,
+    period: int = 1,
+    input_map: ArrayLike | None = None,
+) -> Predictor:
+    """Fit a predictor of any plant.
+
+    Signals are scaled by their root mean square before they are fitted, so that a ridge means the
+    same for every plant.
+
+    Args:
+        episodes: of the plant, see `Episode.of`.
+        kind: one of `KINDS`, see `fit`.
+        T_ini: samples of the past that tell the plant's state: at least its lag.
+        N: samples to predict.
+        ridge: penalty per window on scaled columns, of `ridge`.
+        block_weight: of `ridge` and several agents: the penalty on what one does to another is this
+            squared times as large.
+        period: of `periodic`: samples after which the plant repeats itself.
+        input_map: of `periodic`: what the inputs of an agent act by, shape (w, m), such as the net
+            wrench of forces; the identity if left out.
+
+    Raises:
+        PredictorError: an unknown kind, too little data, or inputs that do not excite the plant.
+    """
+    if kind not in KINDS:
+        raise PredictorError("kind", repr(kind), ", ".join(KINDS), did_you_mean(kind, KINDS))
+    if (period > 1) != (kind == "periodic"):
+        raise PredictorError("period", f"{period} of {kind!r}", "above 1 of 'periodic', else 1")
+    if not (T_ini >= 1 and N >= 1 and ridge >= 0.0 and block_weight > 0.0):
+        got = f"{T_ini}, {N}, {ridge:g}, {block_weight:g}"
+        raise PredictorError("T_ini, N, ridge, block_weight", got, "numbers above 0")
+    if not episodes:
+        raise PredictorError("episodes", "none", "at least one")
+    n, m, p = *episodes[0].u.shape[1:], episodes[0].y.shape[2]
+    B = np.eye(m) if input_map is None else as_signal("input_map", input_map)[:, 0]
+    if B.shape[1] != m:
+        raise PredictorError("input_map", f"shape {B.shape}", f"(w, {m})")
+    check_episodes(episodes, Layout(n, m, p, T_ini, N, (1.0,) * m, (1.0,) * p, everyone(n)))
+    inputs = [episode.deviations()[0] for episode in episodes]
+    scales = _sizes(inputs), _sizes([episode.deviations()[1] for episode in episodes])
+    layout = Layout(n, m, p, T_ini, N, *scales, everyone(n))
+    meta = PredictorMeta(n, N, T_ini, kind, period, ridge, block_weight, plant=layout)
+    if kind == "pinv" or ridge == 0.0:
+        scaled = [episode.scaled_deviations(layout)[0] for episode in episodes]
+        check_excitation(scaled, T_ini + N)
+    return fit(episodes, meta, B / np.array(_sizes([u @ B.T for u in inputs]))[:, None])
+
+
+def _sizes(signals: Sequence[Array]) -> tuple[float, ...]:
+    """Root mean squares of the components of signals (T, n, dim); 1 where one is always zero."""
+    squares = np.concatenate([signal.reshape(-1, signal.shape[2]) for signal in signals]) ** 2
+    sizes = np.sqrt(squares.mean(axis=0))
+    return tuple(np.where(sizes > 0.0, sizes, 1.0).tolist())

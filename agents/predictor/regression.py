@@ -1,16 +1,16 @@
-"""Fits of G by one regression: whether data excite, normal equations, and their solutions."""
+"""Fits of G by one regression over all windows, through the Gram matrix of the data."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from quadriga.agents.predictor.episode import Layout, scales
+from quadriga.agents.predictor.episode import Episode, Layout, check_episodes
 from quadriga.agents.predictor.hankel import columns, gram
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robots.conventions import Array
@@ -22,43 +22,43 @@ Index = NDArray[np.int64]
 _RANK_TOLERANCE: Final = 1e-12
 
 
-@dataclass(frozen=True, slots=True)
-class Excitation:
-    """Result of the rank test: persistently exciting of `order` if `rank` equals `rows`."""
-
-    order: int
-    rows: int
-    columns: int
-    rank: int
-
-    @property
-    def persistent(self) -> bool:
-        """Whether the Hankel matrix has full row rank (definition 1)."""
-        return self.rank == self.rows
-
-
-def excitation(inputs: Sequence[Array], order: int) -> Excitation:
+def hankel_rank(inputs: Sequence[Array], order: int) -> int:
     """Rank of the Hankel matrix of `order` of the inputs of all episodes together.
+
+    They are persistently exciting of this order (definition 1) if it is m · order.
 
     Args:
         inputs: per episode shape (T, m).
-        order: L + n, horizon plus system order.
+        order: block rows; for the fundamental lemma the horizon plus the plant's order.
     """
-    rows, count = order * inputs[0].shape[1], columns(inputs, order)
     S = gram(inputs, order)
     floor = _RANK_TOLERANCE * max(float(np.linalg.norm(S)), np.finfo(float).tiny)
-    S.flat[:: rows + 1] -= floor
+    S.flat[:: len(S) + 1] -= floor
     try:  # Cholesky shows 20 times faster that no eigenvalue is small
         linalg.cholesky(S.T, lower=True, overwrite_a=True, check_finite=False)
-        rank = rows
     except linalg.LinAlgError:
         eigenvalues = linalg.eigvalsh(gram(inputs, order), overwrite_a=True, check_finite=False)
-        rank = int((eigenvalues > floor).sum())
-    return Excitation(order, rows, count, rank)
+        return int((eigenvalues > floor).sum())
+    return len(S)
 
 
-@dataclass(frozen=True, slots=True)
-class Regression:
+def check_excitation(inputs: Sequence[Array], order: int) -> None:
+    """Refuse inputs (T, m) from which the plant's response cannot be told.
+
+    Raises:
+        PredictorError: together they are not persistently exciting of this order.
+    """
+    rank, full = hankel_rank(inputs, order), inputs[0].shape[1] * order
+    if rank < full:
+        raise PredictorError(
+            "inputs in the data",
+            f"a Hankel matrix of rank {rank}",
+            f"rank {full}: persistently exciting of order {order}",
+            "too little data, or an input that hardly varies: more noise, or shorter holds of it",
+        )
+
+
+class Regression(NamedTuple):
     """Sums over M windows of scaled signals, z = [z^1; …; z^n], z^j = [u_ini^j; y_ini^j; u^j].
 
     Attributes:
@@ -72,131 +72,63 @@ class Regression:
     windows: int
 
 
-@dataclass(frozen=True, slots=True)
-class Solutions:
-    """A solver's result.
-
-    Attributes:
-        x: scaled solutions, shape (n, n W, p N); zero in the rows of agents left out.
-        condition: of the regularised normal equations, in the 1-norm, of one agent or the worst.
-    """
-
-    x: Array
-    condition: float
-
-
-@dataclass(frozen=True, slots=True)
-class Penalty:
-    """The block-weighted penalty of a ridge regression.
-
-    Attributes:
-        ridge: per window, on scaled columns.
-        weight: w of the peers' blocks; 1: all columns alike.
-    """
-
-    ridge: float
-    weight: float = 1.0
-
-    def of(self, regression: Regression) -> tuple[float, float]:
-        """Penalty on an agent's own columns and on those of its peers."""
-        own = self.ridge * regression.windows
-        return own, own * self.weight**2
-
-
-def fit_blocks(
-    kind: str, signals: Sequence[Array], layout: Layout, penalty: Penalty
-) -> tuple[Array, float]:
-    """G by one regression over all windows of all episodes.
-
-    Args:
-        kind: "pinv" (eq. 6), or "ridge" with the penalty.
-        signals: of each episode, scaled: [u of all agents; y of all agents], shape (T, n (m + p)).
-        layout: of the predictor.
-        penalty: of the ridge.
-
-    Returns:
-        Blocks in physical units, shape (1, n, n, p N, W), and the regression's condition number.
-
-    Raises:
-        PredictorError: a singular problem.
-    """
-    regression = normal_equations(signals, layout)
-    if kind == "pinv":
-        solutions = solve_pinv(regression, layout)
-    else:
-        solutions = solve_ridge(regression, layout, penalty)
-    return to_physical(solutions.x, layout)[None], solutions.condition
-
-
-def normal_equations(signals: Sequence[Array], layout: Layout) -> Regression:
+def normal_equations(episodes: Sequence[Episode], layout: Layout) -> Regression:
     """The regression over all windows of all episodes.
 
-    Args:
-        signals: of each episode, scaled: [u of all agents; y of all agents], shape (T, n (m + p)).
-        layout: of the predictor.
+    Raises:
+        PredictorError: no data, too little, or of another plant.
     """
-    L = layout.T_ini + layout.N
-    return _split_by_agent(gram(signals, L), layout, columns(signals, L))
+    S, windows = _sample_gram(episodes, layout)
+    n, m, p = layout.agents, layout.inputs, layout.outputs
+    index = np.arange(len(S)).reshape(-1, n * (m + p))
+    past, future = index[: layout.T_ini], index[layout.T_ini :]
+    parts = ((past[:, : n * m], m), (past[:, n * m :], p), (future[:, : n * m], m))
+    inputs = np.concatenate([_by_agent(part, n, dim) for part, dim in parts], axis=1).ravel()
+    outputs = _by_agent(future[:, n * m :], n, p).ravel()
+    zz, zy = S[np.ix_(inputs, inputs)], S[np.ix_(inputs, outputs)]
+    return Regression(zz, zy.reshape(len(inputs), n, -1), windows)
 
 
-def solve_pinv(regression: Regression, layout: Layout) -> Solutions:
-    """Y_f Z† = (Σ y zᵀ)(Σ z zᵀ)†, the solution of least norm where several are best.
+def solve_pinv(regression: Regression, layout: Layout) -> Array:
+    """Y_f Z† = (Σ y zᵀ)(Σ z zᵀ)†, the solution of least norm where several are best (eq. 6).
 
     Solved once for all agents whose regressions have the same columns.
+
+    Returns:
+        Scaled solutions, shape (n, n W, p N); zero in the rows of agents left out.
     """
     n = layout.agents
-    x, condition = np.zeros((n, n * layout.width, layout.rows)), 0.0
-    groups: dict[tuple[int, ...], list[int]] = {}
-    for i, members in enumerate(layout.members):
-        groups.setdefault(members, []).append(i)
-    for members, group in groups.items():
-        agents, rows = np.array(group), past_first(layout, members)
+    x = np.zeros((n, n * layout.width, layout.rows))
+    for members in set(layout.members):
+        agents = np.array([i for i in range(n) if layout.members[i] == members])
+        rows = _past_first(layout, members)
         b = regression.zy[np.ix_(rows, agents)].reshape(len(rows), -1)
-        solution, one = _solve_least_norm(regression.zz[np.ix_(rows, rows)], b)
+        solution = _solve_least_norm(regression.zz[np.ix_(rows, rows)], b)
         x[np.ix_(agents, rows)] = solution.reshape(len(rows), len(agents), -1).transpose(1, 0, 2)
-        condition = max(condition, one)
-    return Solutions(x, condition)
+    return x
 
 
-def _solve_least_norm(A: Array, b: Array) -> tuple[Array, float]:
-    floor = _RANK_TOLERANCE * float(np.linalg.norm(A))
-    norm = float(np.linalg.norm(A, 1))
-    try:  # Cholesky shows much faster that no eigenvalue is small
-        shifted = A.copy(order="F")
-        shifted.flat[:: len(A) + 1] -= floor
-        factorise(shifted)
-        factor = factorise(A.copy(order="F"))
-        x: Array = linalg.cho_solve((factor, True), b, check_finite=False)
-        return x, condition_number(norm, factor)
-    except PredictorError:
-        values, vectors = linalg.eigh(A, check_finite=False)
-        significant = values > floor
-        V = vectors[:, significant]
-        return V @ ((V.T @ b) / values[significant, None]), float(
-            values[-1] / values[significant][0]
-        )
+def solve_ridge(regression: Regression, layout: Layout, ridge: float, weight: float) -> Array:
+    """Penalty ridge · M on agent i's own columns and weight² times as much on its peers'.
 
-
-def solve_ridge(regression: Regression, layout: Layout, penalty: Penalty) -> Solutions:
-    """Penalty ridge · M on agent i's own columns and w² times as much on its peers'.
+    Returns:
+        Scaled solutions, shape (n, n W, p N); zero in the rows of agents left out.
 
     Raises:
         PredictorError: a singular problem.
     """
     n, W = layout.agents, layout.width
-    light, heavy = penalty.of(regression)
+    own = ridge * regression.windows
+    peers = own * weight**2
     if all(len(members) == n for members in layout.members):
-        A = _add_penalty(regression.zz, np.where(np.arange(n * W) < W, light, heavy))
-        condition = condition_number(_norm(A), factorise(A))
-        return Solutions(_solve_each(regression.zz, regression.zy, W, light, heavy), condition)
-    x, condition = np.zeros((n, n * W, layout.rows)), 0.0
+        return _solve_each(regression.zz, regression.zy, W, own, peers)
+    x = np.zeros((n, n * W, layout.rows))
     for i, members in enumerate(layout.members):
         rows = (np.array(members)[:, None] * W + np.arange(W)).ravel()
-        A = _add_penalty(regression.zz[np.ix_(rows, rows)], np.where(rows // W == i, light, heavy))
-        norm, factor = _norm(A), factorise(A)
+        penalty = np.where(rows // W == i, own, peers)
+        factor = factorise(_add_penalty(regression.zz[np.ix_(rows, rows)], penalty))
         x[i, rows] = linalg.cho_solve((factor, True), regression.zy[rows, i], check_finite=False)
-        condition = max(condition, condition_number(norm, factor))
-    return Solutions(x, condition)
+    return x
 
 
 def factorise(A: Array) -> Array:
@@ -216,14 +148,38 @@ def factorise(A: Array) -> Array:
         ) from None
 
 
-def condition_number(norm: float, factor: Array) -> float:
-    """Estimate of ‖A‖₁ ‖A⁻¹‖₁ from ‖A‖₁ and the lower Cholesky factor of A."""
-    reciprocal, _ = linalg.lapack.dpocon(factor, norm, uplo="L")
-    return 1.0 / reciprocal if reciprocal > 0.0 else np.inf
+def to_physical(x: Array, layout: Layout) -> Array:
+    """Blocks in physical units, (n, n, p N, W), from scaled solutions (n, n W, p N)."""
+    n = layout.agents
+    blocks = x.reshape(n, n, layout.width, -1).transpose(0, 1, 3, 2)
+    z_scale, y_scale = layout.scales()
+    return np.ascontiguousarray(blocks * y_scale[:, None] / z_scale)
 
 
-def _norm(A: Array) -> float:
-    return float(np.linalg.norm(A, 1))
+def scaled_blocks(G: Array, layout: Layout) -> Array:
+    """Blocks that map scaled signals to scaled signals, of the shape of `G`."""
+    z_scale, y_scale = layout.scales()
+    return G * z_scale / y_scale[:, None]
+
+
+def _sample_gram(episodes: Sequence[Episode], layout: Layout) -> tuple[Array, int]:
+    """Gram matrix of windows of scaled [u of all agents; y of all], and how many windows."""
+    check_episodes(episodes, layout)
+    signals = [np.concatenate(each.scaled_deviations(layout), axis=1) for each in episodes]
+    L = layout.T_ini + layout.N
+    return gram(signals, L), columns(signals, L)
+
+
+def _by_agent(index: Index, n: int, dim: int) -> Index:
+    """Reorder stacked (time, agent, dim) indices to one row of (time, dim) per agent."""
+    return index.reshape(-1, n, dim).transpose(1, 0, 2).reshape(n, -1)
+
+
+def _past_first(layout: Layout, members: Sequence[int]) -> Index:
+    """Rows of `zz` of some agents by time: all [u_ini; y_ini], then each sample's inputs."""
+    rows = np.arange(layout.agents * layout.width).reshape(layout.agents, -1)[list(members)]
+    future = rows[:, layout.past :].reshape(len(members), layout.N, layout.inputs)
+    return np.concatenate([rows[:, : layout.past].ravel(), future.transpose(1, 0, 2).ravel()])
 
 
 def _add_penalty(A: Array, penalty: Array | float) -> Array:
@@ -233,26 +189,39 @@ def _add_penalty(A: Array, penalty: Array | float) -> Array:
     return copy
 
 
-def _solve_each(A: Array, b: Array, W: int, light: float, heavy: float) -> Array:
-    """Solutions x_i of (A + D_i) x_i = b_i, D_i = light on block i and heavy on all others.
+def _solve_least_norm(A: Array, b: Array) -> Array:
+    floor = _RANK_TOLERANCE * float(np.linalg.norm(A))
+    try:  # Cholesky shows much faster that no eigenvalue is small
+        factorise(_add_penalty(A, -floor))
+    except PredictorError:
+        values, vectors = linalg.eigh(A, check_finite=False)
+        significant = values > floor
+        V = vectors[:, significant]
+        return V @ ((V.T @ b) / values[significant, None])
+    x: Array = linalg.cho_solve((factorise(A.copy(order="F")), True), b, check_finite=False)
+    return x
 
-    One half of the blocks, all with the heavy penalty, is eliminated, which leaves the same problem
-    for the other half; so all n solutions cost 7/3 of one factorisation. Correcting one common
-    factorisation for each block would lose digits where the ratio of the penalties is large.
+
+def _solve_each(A: Array, b: Array, W: int, own: float, peers: float) -> Array:
+    """Solutions x_i of (A + D_i) x_i = b_i, D_i = own on block i and peers on all others.
+
+    One half of the blocks, all with the peers' penalty, is eliminated, which leaves the same
+    problem for the other half; so all n solutions cost 7/3 of one factorisation. Correcting one
+    common factorisation for each block would lose digits where the ratio of the penalties is large.
 
     Args:
         A: shape (n W, n W).
         b: right-hand sides, shape (n W, n, k).
         W: size of a block.
-        light: penalty on the own block.
-        heavy: penalty on the others.
+        own: penalty on the own block.
+        peers: penalty on the others.
 
     Returns:
         Shape (n, n W, k).
     """
     n, k = len(A) // W, b.shape[2]
     if n == 1:
-        factor = factorise(_add_penalty(A, light))
+        factor = factorise(_add_penalty(A, own))
         return linalg.cho_solve((factor, True), b[:, 0], check_finite=False)[None]
     x = np.empty((n, n * W, k))
     for half, eliminated in (
@@ -260,13 +229,13 @@ def _solve_each(A: Array, b: Array, W: int, light: float, heavy: float) -> Array
         (slice(n // 2, n), slice(0, n // 2)),
     ):
         K, D = (slice(s.start * W, s.stop * W) for s in (half, eliminated))
-        factor = factorise(_add_penalty(A[D, D], heavy))
+        factor = factorise(_add_penalty(A[D, D], peers))
         X, R = (
             linalg.solve_triangular(factor, rhs, lower=True, check_finite=False)
             for rhs in (A[D, K], b[D, half].reshape(D.stop - D.start, -1))
         )
         rest = b[K, half] - (X.T @ R).reshape(K.stop - K.start, -1, k)
-        solution = _solve_each(A[K, K] - X.T @ X, rest, W, light, heavy)
+        solution = _solve_each(A[K, K] - X.T @ X, rest, W, own, peers)
         x[half, K] = solution
         across = R - (X @ solution.transpose(1, 0, 2).reshape(K.stop - K.start, -1))
         back = linalg.solve_triangular(factor, across, lower=True, trans=1, check_finite=False)
@@ -274,40 +243,61 @@ def _solve_each(A: Array, b: Array, W: int, light: float, heavy: float) -> Array
     return x
 
 
-def to_physical(x: Array, layout: Layout) -> Array:
-    """Blocks in physical units, (n, n, p N, W), from scaled solutions (n, n W, p N)."""
-    n = layout.agents
-    blocks = x.reshape(n, n, layout.width, -1).transpose(0, 1, 3, 2)
-    z_scale, y_scale = scales(layout)
-    return np.ascontiguousarray(blocks * y_scale[:, None] / z_scale)
+# ---- DeePC (eq. 5): what depends on the data alone and not on any weight
 
 
-def scaled_blocks(G: Array, layout: Layout) -> Array:
-    """Blocks that map scaled signals to scaled signals, of the shape of `G`."""
-    z_scale, y_scale = scales(layout)
-    return G * z_scale / y_scale[:, None]
+@dataclass(frozen=True, slots=True)
+class Reduction:
+    """b + [σ; 0] = Φ a + M z with a = [u_ini; u] and b = [y_ini; y], scaled, agents first.
+
+    The Cholesky factor of the data's Gram matrix S, inputs first, gives every g that matters as two
+    orthogonal parts: one that a determines, with ‖·‖² = aᵀ S_aa⁻¹ a, and one of free coordinates z.
+    At the optimum g has no part outside the span of the data's rows.
+    `quadriga.agents.planner.deepc_qp` makes the QP of this.
+
+    Attributes:
+        layout: sizes of the problem, with L = T_ini + N, and the scales.
+        inverse: S_aa⁻¹, shape (m n L, m n L).
+        response: Φ = S_ba S_aa⁻¹, outputs that the inputs explain, shape (p n L, m n L).
+        spread: M, M Mᵀ = S_bb − S_ba S_aa⁻¹ S_ab, what they leave open, shape (p n L, rank).
+    """
+
+    layout: Layout
+    inverse: Array
+    response: Array
+    spread: Array
 
 
-def past_first(layout: Layout, members: Sequence[int]) -> Index:
-    """Rows of `zz` of some agents by time: all [u_ini; y_ini], then each sample's inputs."""
-    rows = np.arange(layout.agents * layout.width).reshape(layout.agents, -1)[list(members)]
-    future = rows[:, layout.past :].reshape(len(members), layout.N, layout.inputs)
-    return np.concatenate([rows[:, : layout.past].ravel(), future.transpose(1, 0, 2).ravel()])
+def reduce(episodes: Sequence[Episode], layout: Layout) -> Reduction:
+    """Split the outputs in the data into a part that the inputs explain and the rest.
 
-
-def agents_first(index: Index, n: int, dim: int) -> Index:
-    """Reorder stacked (time, agent, dim) indices to one row of (time, dim) per agent."""
-    return index.reshape(-1, n, dim).transpose(1, 0, 2).reshape(n, -1)
-
-
-def _split_by_agent(S: Array, layout: Layout, windows: int) -> Regression:
-    """Cut the Gram matrix of windows of [u of all; y of all] into the agents' parts."""
-    n, m, p = layout.agents, layout.inputs, layout.outputs
-    index = np.arange((layout.T_ini + layout.N) * n * (m + p)).reshape(-1, n * (m + p))
-    past, future = index[: layout.T_ini], index[layout.T_ini :]
-    parts = ((past[:, : n * m], m), (past[:, n * m :], p), (future[:, : n * m], m))
-    inputs = np.concatenate([agents_first(part, n, dim) for part, dim in parts], axis=1).ravel()
-    outputs = agents_first(future[:, n * m :], n, p).ravel()
-    return Regression(
-        S[np.ix_(inputs, inputs)], S[np.ix_(inputs, outputs)].reshape(len(inputs), n, -1), windows
+    Raises:
+        PredictorError: no data, too little, of another plant, or inputs that do not excite.
+    """
+    S, windows = _sample_gram(episodes, layout)
+    n, m, p, T_ini = layout.agents, layout.inputs, layout.outputs, layout.T_ini
+    index = np.arange(len(S)).reshape(-1, n * (m + p))
+    a, b = (
+        np.concatenate([_by_agent(part, n, dim).ravel() for part in (x[:T_ini], x[T_ini:])])
+        for x, dim in ((index[:, : n * m], m), (index[:, n * m :], p))
     )
+    S_aa, S_ab = S[np.ix_(a, a)], S[np.ix_(a, b)]
+    try:
+        factorise(S_aa - _RANK_TOLERANCE * float(np.linalg.norm(S_aa)) * np.eye(len(a)))
+    except PredictorError:
+        raise PredictorError(
+            "episodes",
+            f"inputs in {windows} windows that are not persistently exciting of order "
+            f"{T_ini + layout.N}",
+            f"a Hankel matrix of rank {len(a)}",
+            "too little data, or too little noise in the inputs",
+        ) from None
+    factor = linalg.cho_factor(S_aa, check_finite=False)
+    solved = linalg.cho_solve(factor, np.hstack([S_ab, np.eye(len(a))]), check_finite=False)
+    response, inverse = solved[:, : len(b)].T, solved[:, len(b) :]
+    S_bb = S[np.ix_(b, b)]
+    left = S_bb - response @ S_ab
+    values, vectors = linalg.eigh(0.5 * (left + left.T), check_finite=False)
+    significant = values > _RANK_TOLERANCE * np.linalg.norm(S_bb)
+    spread = vectors[:, significant] * np.sqrt(values[significant])
+    return Reduction(layout, 0.5 * (inverse + inverse.T), np.ascontiguousarray(response), spread)

@@ -18,7 +18,7 @@ def load_predictor(config: Config, arguments: argparse.Namespace) -> Predictor:
     Raises:
         PredictorError: there is none after `--wait` seconds, or it is not of this team.
     """
-    from quadriga.agents.planner.acceptance import load_checked
+    from quadriga.agents.predictor.gates import load_checked
     from quadriga.identification.cache import await_predictor, predictor_path
 
     path = arguments.predictor or predictor_path(config)
@@ -35,7 +35,7 @@ def fitted_sha256(config: Config, wait: float) -> str:
     """
     if not find_kind(config.planner.kind).needs_predictor:
         return ""
-    from quadriga.agents.planner.acceptance import load_checked
+    from quadriga.agents.predictor.gates import load_checked
     from quadriga.agents.predictor.store import predictor_sha256
     from quadriga.identification.cache import await_predictor, predictor_path
 

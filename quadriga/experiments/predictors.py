@@ -9,7 +9,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from quadriga.agents.planner.acceptance import load_checked
+from quadriga.agents.predictor.gates import load_checked
 from quadriga.agents.predictor.store import predictor_sha256
 from quadriga.identification.cache import data_path, predictor_path
 from quadriga.identification.predictors import ensure_data, ensure_predictor, reason

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from quadriga.agents.predictor.fits import FITS
+from quadriga.agents.predictor.predictor import KINDS
 from quadriga.shared.config.load import flatten, parse_assignment, read_toml
 from quadriga.shared.controller_line import KEY as CONTROLLER
 from quadriga.shared.errors import ConfigError
@@ -58,7 +58,7 @@ _THROUGH: Final[Keys] = {"identification.max_radius": 10.0, "identification.max_
 # scheme iterates with a radius above 1, and with effects of peers that are not there. What then
 # happens is worth seeing.
 PREDICTORS: Final[Mapping[str, Keys]] = {
-    **{kind: {"identification.predictor": kind} for kind in FITS},
+    **{kind: {"identification.predictor": kind} for kind in KINDS},
     "plain": {"identification.predictor": "ridge", "identification.block_weight": 1.0, **_THROUGH},
     "paper": {"identification.predictor": "pinv", **_THROUGH},
 }

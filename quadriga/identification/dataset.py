@@ -9,9 +9,9 @@ from typing import Final
 
 import numpy as np
 
-from quadriga.agents.predictor.episode import SIGNALS, Episode
+from quadriga.agents.predictor import regression
+from quadriga.agents.predictor.episode import SIGNALS, Episode, team_layout
 from quadriga.agents.predictor.hankel import required_samples
-from quadriga.agents.predictor.regression import excitation
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError, PredictorFileError
 from quadriga.shared.robots.conventions import N_FORCES, Array
@@ -37,7 +37,6 @@ def check_excitation(config: Config, training: Sequence[Episode]) -> None:
         PredictorError: too few samples, or inputs that leave directions unexcited.
     """
     n, planner = config.team.robots, config.planner
-    length = planner.T_ini + planner.N
     order = config.identification.order_per_robot * n
     required = required_samples(N_FORCES * n, planner.T_ini, planner.N, order)
     samples = sum(episode.samples for episode in training)
@@ -48,14 +47,9 @@ def check_excitation(config: Config, training: Sequence[Episode]) -> None:
             f"at least {required} by (m+1)(T_ini+N+n)−1",
             "collect more: identification.seconds, or fewer falls",
         )
-    rank_test = excitation([episode.scaled_deviations()[0] for episode in training], length + order)
-    if not rank_test.persistent:
-        raise PredictorError(
-            "collected data",
-            f"a Hankel matrix of the inputs of rank {rank_test.rank}",
-            f"rank {rank_test.rows}: inputs persistently exciting of order {rank_test.order}",
-            "more noise (identification.noise) or shorter holds (identification.noise_hold_ms)",
-        )
+    layout = team_layout(n, planner.T_ini, planner.N)
+    inputs = [episode.scaled_deviations(layout)[0] for episode in training]
+    regression.check_excitation(inputs, planner.T_ini + planner.N + order)
 
 
 def write_data(path: Path, dataset: Dataset) -> None:

@@ -2,26 +2,36 @@
 
 from __future__ import annotations
 
+import json
 import os
 import tempfile
+from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any, Final
 
 from rich.console import Console
 
-from quadriga.agents.planner.acceptance import gates_in_force, load_checked, run_gates
-from quadriga.agents.predictor.fits import fit as fit_predictor
-from quadriga.agents.predictor.gates import GateReport
-from quadriga.agents.predictor.measured_response import check_measured_plant
+from quadriga.agents.predictor.gates import GateReport, Provenance, gates_in_force, read, run_gates
+from quadriga.agents.predictor.measured_response import read_pulse_responses
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
-from quadriga.agents.predictor.store import Provenance, read, save, versions
+from quadriga.agents.predictor.predictor import fit as fit_predictor
+from quadriga.agents.predictor.store import save, versions
 from quadriga.identification.cache import data_path, predictor_path
 from quadriga.identification.collect import collect, collection_seconds
 from quadriga.identification.dataset import Dataset, check_excitation, read_data, write_data
 from quadriga.progress import build_progress
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import config_sha256
-from quadriga.shared.errors import PredictorError, QuadrigaError
+from quadriga.shared.errors import PredictorError, PredictorFileError, QuadrigaError
 from quadriga.shared.runtime.blas import use_one_blas_thread
+from quadriga.shared.runtime.clock import monotonic
+
+# What a true response depends on beside the controller: of a predictor's meta, and sections.
+_TEAM: Final = (
+    "robots", "robot", "yokes", "alternate_phase", "stance_ms", "stand_ms", "interface",
+)  # fmt: skip
+_PLANT: Final = ("motors", "sensors", "estimator")
+Judged = tuple[Predictor, Provenance]  # a predictor and the figures of its gates, whatever they say
 
 
 def ensure_predictor(config: Config, console: Console) -> Path:
@@ -30,35 +40,29 @@ def ensure_predictor(config: Config, console: Console) -> Path:
     Raises:
         PredictorError: the data are too little or not exciting, or a gate refuses the fit.
     """
-    path = predictor_path(config)
-    if path.is_file():
-        load_checked(path, config)
-        return path
-    fit(config, ensure_data(config, console), path, console)
-    return path
+    fit_or_read(config, console)[1].gates.check(config)
+    return predictor_path(config)
 
 
-def fit_or_read(config: Config, console: Console) -> tuple[Predictor, GateReport]:
-    """The predictor of `config` with the figures of its gates, whatever they say.
+def fit_or_read(config: Config, console: Console, dataset: Dataset | None = None) -> Judged:
+    """The predictor of `config`, read if it is kept; else fitted, and kept if it is accepted.
 
-    It is read if it is kept. Else it is fitted, to data that are collected if there are none, and
-    kept if its gates accept it.
+    Args:
+        config: the team's configuration.
+        console: for progress.
+        dataset: to fit to; None: the collected data, which are collected if there are none.
 
     Raises:
         PredictorError: the data are too little or not exciting.
     """
     path = predictor_path(config)
     if path.is_file():
-        predictor, origin = read(path)
-        return predictor, gates_in_force(origin.gates, config, predictor)
-    dataset = ensure_data(config, console)
-    check_excitation(config, dataset.training)
+        predictor, provenance = read(path)
+        gates = gates_in_force(provenance.gates, config, predictor)
+        return predictor, replace(provenance, gates=gates)
+    dataset = dataset or ensure_data(config, console)
     with console.status(f"fitting the predictor {config.identification.predictor}"):
-        predictor = fit_now(config, dataset)
-        origin = judge_now(config, dataset, predictor)
-    if refusal(origin.gates, config.planner.kind) is None:
-        save(path, predictor, origin)
-    return predictor, origin.gates
+        return fit(config, dataset, path)
 
 
 def ensure_data(config: Config, console: Console) -> Dataset:
@@ -86,54 +90,64 @@ def ensure_data(config: Config, console: Console) -> Dataset:
     return dataset
 
 
-def fit(config: Config, dataset: Dataset, path: Path, console: Console) -> tuple[str, GateReport]:
-    """Fit a predictor, hold it against its gates and keep it.
-
-    Returns:
-        The predictor's digest and the figures it was accepted with.
+def fit(config: Config, dataset: Dataset, path: Path) -> Judged:
+    """Fit a predictor, hold it against its gates and, if they accept it, keep it.
 
     Raises:
-        PredictorError: too little data, not exciting, or refused by a gate.
-    """
-    check_excitation(config, dataset.training)
-    with console.status("fitting the predictor"):
-        predictor = fit_now(config, dataset)
-        origin = judge_now(config, dataset, predictor)
-    gates = origin.gates
-    if gates.peers is not None and (found := gates.peers.describe()):
-        console.print(f"effect of peers as predicted: {found}; see `quadriga fit`", highlight=False)
-    gates.check(config.planner.kind)
-    return save(path, predictor, origin), gates
-
-
-def fit_now(config: Config, dataset: Dataset) -> Predictor:
-    """The predictor of a configuration, fitted to these data.
-
-    Raises:
-        PredictorError: too little data, or a singular problem.
+        PredictorError: too little data, not exciting, or a singular problem.
         PredictorFileError: configured responses that are missing, or of another team.
     """
+    check_excitation(config, dataset.training)
+    check_measured_team(config)
     use_one_blas_thread()
-    check_measured_plant(config)
-    return fit_predictor(dataset.training, PredictorMeta.of(config))
-
-
-def judge_now(config: Config, dataset: Dataset, predictor: Predictor) -> Provenance:
-    """Where a predictor fitted now comes from, with the figures of its gates."""
-    return Provenance(
+    begun = monotonic()
+    predictor = fit_predictor(dataset.training, PredictorMeta.of(config))
+    provenance = Provenance(
         config_digest=config_sha256(config),
         seeds=dataset.seeds,
         samples=tuple(episode.samples for episode in dataset.training),
         held_out=tuple(episode.samples for episode in dataset.held_out),
         versions=versions(),
+        fit_seconds=monotonic() - begun,
         gates=run_gates(config, predictor, dataset.held_out),
     )
+    if refusal(provenance.gates, config) is None:
+        save(path, predictor, asdict(provenance))
+    return predictor, provenance
 
 
-def refusal(gates: GateReport, kind: str) -> PredictorError | None:
-    """The gate that refuses a predictor for a kind of planner, None if all accept it."""
+def measured_team(config: Config) -> dict[str, Any]:
+    """What a team's true response depends on, by key, as JSON has it."""
+    meta = PredictorMeta.of(config)
+    known = {name: getattr(meta, name) for name in _TEAM}
+    known |= {f"controller.{key}": value for key, value in meta.controller}
+    for section in _PLANT:
+        known |= {f"{section}.{k}": v for k, v in asdict(getattr(config, section)).items()}
+    team: dict[str, Any] = json.loads(json.dumps(known))
+    return team
+
+
+def check_measured_team(config: Config) -> None:
+    """Refuse configured responses of another team.
+
+    Raises:
+        PredictorFileError: no such file, not one of responses, or of another team.
+    """
+    if not config.response_file:
+        return
+    measured = read_pulse_responses(Path(config.response_file)).team
+    for key, expected in measured_team(config).items():
+        if measured.get(key) != expected:
+            got = f"responses of a team with {key} = {measured.get(key)!r}"
+            raise PredictorFileError(
+                "identification.response", got, f"{expected!r}", "measure it: `quadriga probe`"
+            )
+
+
+def refusal(gates: GateReport, config: Config) -> PredictorError | None:
+    """The gate that refuses a predictor for the configured planner, None if all accept it."""
     try:
-        gates.check(kind)
+        gates.check(config)
     except PredictorError as error:
         return error
     return None

@@ -9,10 +9,9 @@ from typing import Final
 import numpy as np
 
 from quadriga.agents.gait import nominal_forces, scheduled_stance
-from quadriga.agents.planner.acceptance import run_gates
 from quadriga.agents.predictor.episode import U_SCALE, Y_SCALE, Episode
-from quadriga.agents.predictor.fits import FITS, fit
-from quadriga.agents.predictor.predictor import PredictorMeta
+from quadriga.agents.predictor.gates import coupling_table, run_gates
+from quadriga.agents.predictor.predictor import KINDS, PredictorMeta, fit
 from quadriga.agents.time_grid import sample_starts
 from quadriga.identification.behaviour import numbers
 from quadriga.shared.config.load import load
@@ -31,7 +30,7 @@ def samples() -> Iterator[Array]:
     use_one_blas_thread()
     config = load(None, _KEYS)
     first, second, held_out = (linear_episode(config, _SAMPLES, seed) for seed in range(3))
-    for kind in FITS:
+    for kind in KINDS:
         for neighbours in ("all", "yoked"):
             chosen = replace(config.identification, predictor=kind, neighbours=neighbours)
             of_kind = replace(config, identification=chosen)
@@ -40,10 +39,8 @@ def samples() -> Iterator[Array]:
             gates = run_gates(of_kind, predictor, (held_out,))
             # Not the condition: its last bit depends on where in memory the arrays lie.
             yield numbers(gates.error, gates.radius)
-            yield from (np.array(gates.gains), np.array(gates.coupling))
-            if gates.peers is not None:
-                slopes, harms = gates.peers.slope.values(), gates.peers.harm.values()
-                yield from (numbers(*bounds) for bounds in (*slopes, *harms))
+            yield from (np.array(gates.gains), coupling_table(predictor))
+            yield from (numbers(*bounds) for bounds in gates.harm.values())
             yield np.array([*gates.rmse.values(), *gates.rmse_persistence.values()])
 
 

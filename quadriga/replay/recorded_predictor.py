@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from quadriga.agents.predictor.predictor import Predictor
-from quadriga.agents.predictor.store import predictor_sha256, read
+from quadriga.agents.predictor.store import load, predictor_sha256
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError, RecordingError, name_file_errors
 from quadriga.shared.planner_kinds import find_kind
@@ -55,7 +55,7 @@ def find_predictor(
         return None, True
     sha256 = recording.metadata.get("predictor_sha256", "")
     if given is not None:
-        predictor = read(given)[0]
+        predictor = load(given)[0]
         return predictor, not sha256 or predictor_sha256(predictor) == sha256
     return _find_kept(recording), True
 
@@ -86,7 +86,7 @@ def _find_kept(recording: Recording) -> Predictor:
     beside = recording.path.parent / PREDICTOR
     for path in (beside, *cache_files("predictor")):
         if sha256 and _read_digest(path) == sha256:
-            return read(path)[0]
+            return load(path)[0]
     wanted = f"with digest {sha256[:16]}…" if sha256 else "of unknown digest"
     raise PredictorError(
         f"predictor of {recording.path}",

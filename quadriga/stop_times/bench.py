@@ -173,7 +173,7 @@ def _take_predictor(config: Config, console: Console) -> _Predictor:
     warm_up(config, console)
     if not find_kind(config.planner.kind).needs_predictor:
         return _Predictor(None, "")
-    from quadriga.agents.planner.acceptance import load_checked
+    from quadriga.agents.predictor.gates import load_checked
 
     file = ensure_predictor(config, console)
     return _Predictor(file, predictor_sha256(load_checked(file, config)[0]))

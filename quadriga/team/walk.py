@@ -145,7 +145,7 @@ def _take_predictor(config: Config, run_dir: Path, console: Console) -> tuple[Pa
         ensure_data(config, console)
     if not kind.needs_predictor:
         return None, ""
-    from quadriga.agents.planner.acceptance import load_checked
+    from quadriga.agents.predictor.gates import load_checked
     from quadriga.agents.predictor.store import predictor_sha256
     from quadriga.identification.cache import predictor_path
     from quadriga.replay.recorded_predictor import copy_predictor

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,11 +11,10 @@ import pytest
 from scipy import linalg
 
 from quadriga.agents.gait import scheduled_stance
-from quadriga.agents.planner.acceptance import run_gates
 from quadriga.agents.predictor.episode import Episode
-from quadriga.agents.predictor.fits import fit_ridge
-from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
-from quadriga.agents.predictor.store import Provenance, save, versions
+from quadriga.agents.predictor.gates import Provenance, run_gates
+from quadriga.agents.predictor.predictor import Predictor, PredictorMeta, fit
+from quadriga.agents.predictor.store import save, versions
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robots.conventions import Array
 from tests.a1 import TOTAL_MASS, nominal_forces
@@ -96,6 +95,11 @@ class LinearTeam:
         return Episode(u=nominal + du, u_nominal=nominal, y=y, y_base=base, first_tick=410)
 
 
+def fit_ridge(episodes: Sequence[Episode], meta: PredictorMeta) -> Predictor:
+    """The ridge fit, whatever kind the meta names."""
+    return fit(episodes, replace(meta, kind="ridge"))
+
+
 @pytest.fixture(scope="session")
 def linear_team() -> Callable[..., LinearTeam]:
     return LinearTeam
@@ -131,5 +135,5 @@ def fitted(plant: Config) -> tuple[Predictor, Provenance]:
 @pytest.fixture
 def stored(tmp_path: Path, fitted: tuple[Predictor, Provenance]) -> Path:
     path = tmp_path / "cache" / "predictor.npz"
-    save(path, *fitted)
+    save(path, fitted[0], asdict(fitted[1]))
     return path

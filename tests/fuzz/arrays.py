@@ -6,27 +6,23 @@ import json
 import zipfile
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import asdict
 from io import BytesIO
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from quadriga.agents.predictor.episode import Episode
-from quadriga.agents.predictor.gates import GateReport
+from quadriga.agents.predictor.episode import Episode, check_episodes, team_layout, wrench_map
+from quadriga.agents.predictor.gates import GateReport, Provenance, read
 from quadriga.agents.predictor.measured_response import (
     PulseResponses,
     fit_measured_response,
     read_pulse_responses,
-    team_of,
     write_pulse_responses,
 )
-from quadriga.agents.predictor.plant import Data, PlantPredictor
-from quadriga.agents.predictor.plant import fit as fit_plant
-from quadriga.agents.predictor.plant import load as load_fitted
-from quadriga.agents.predictor.plant import save as save_fitted
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
-from quadriga.agents.predictor.store import Provenance, predictor_sha256, read, save
+from quadriga.agents.predictor.store import predictor_sha256, save
 from quadriga.experiments.probe.responses import (
     Repetition,
     average,
@@ -40,7 +36,7 @@ from quadriga.shared.config.load import load
 from tests.fuzz.damage import damage
 from tests.fuzz.target import change_json
 
-REPORT: Final = GateReport(1, {}, {}, 0.5, (0.1,), ((1.0,),), (0.3, 2.0), 0.1, 0.5, (), ())
+REPORT: Final = GateReport(1, {}, {}, 0.5, ((1.0, 1.0),), 0.1)
 SMALL: Final = {"team.robots": 1, "planner.kind": "none", "planner.N": 8, "planner.T_ini": 4}
 _EDGE: Final = 1000  # bytes at the begin and at the end, which tell of the arrays between
 _SHAPES: Final = ((), (0,), (1,), (3, 0), (2, 2, 2, 2, 2), (1, 1, 4, 12), (1 << 20,))
@@ -130,7 +126,7 @@ def predictors(folder: Path) -> Archives:
     predictor = Predictor(meta, np.zeros((1, 1, 1, 6 * meta.N, meta.width)))
 
     def write(path: Path) -> None:
-        save(path, predictor, Provenance("abc", (1,), (900,), (100,), {}, REPORT))
+        save(path, predictor, asdict(Provenance("abc", (1,), (900,), (100,), {}, REPORT)))
 
     def sign(arrays: dict[str, Any]) -> None:
         document = json.loads(str(arrays["document"]))
@@ -141,17 +137,6 @@ def predictors(folder: Path) -> Archives:
     return Archives(folder / "predictor.npz", write, read, sign)
 
 
-def library_predictors(folder: Path) -> Archives:
-    """Predictors of any plant."""
-    random = np.random.default_rng(0)
-    u = random.normal(size=(200, 1, 1))
-    y = np.zeros((200, 1, 1))
-    for k in range(1, 200):
-        y[k] = 0.8 * y[k - 1] + u[k - 1]
-    fitted: PlantPredictor = fit_plant(Data(u, y), "ridge", 2, 3)
-    return Archives(folder / "library.npz", lambda path: save_fitted(path, fitted), load_fitted)
-
-
 def datasets(folder: Path) -> Archives:
     """Collected data."""
     random = np.random.default_rng(0)
@@ -160,8 +145,7 @@ def datasets(folder: Path) -> Archives:
     whole = Dataset((episode, episode), (episode,), (1, 2))
 
     def read_all(path: Path) -> None:
-        for each in read_data(path).training:
-            each.scaled_deviations()
+        check_episodes(read_data(path).training, team_layout(1, 4, 8))
 
     return Archives(folder / "data.npz", lambda path: write_data(path, whole), read_all)
 
@@ -171,10 +155,10 @@ def pulse_responses(folder: Path) -> Archives:
     meta = PredictorMeta.of(load(None, SMALL))
     random = np.random.default_rng(0)
     u, y = random.normal(size=(2, 1, 6, meta.N, 12)), random.normal(size=(2, 1, 6, meta.N, 1, 6))
-    responses = PulseResponses(np.array([0, 100]), u, y, team_of(meta))
+    responses, wrench = PulseResponses(np.array([0, 100]), u, y, {}), wrench_map(meta.robot)
 
     def read_all(path: Path) -> None:
-        fit_measured_response(read_pulse_responses(path), meta)
+        fit_measured_response(read_pulse_responses(path), meta.layout, meta.period, wrench)
 
     return Archives(
         folder / "responses.npz", lambda path: write_pulse_responses(path, responses), read_all

@@ -30,7 +30,6 @@ KINDS: Final[Mapping[str, Callable[[Path], Target]]] = {
     "packs": campaigns.Packs,
     "json-rows": campaigns.json_rows,
     "predictors": arrays.predictors,
-    "library-predictors": arrays.library_predictors,
     "datasets": arrays.datasets,
     "pulse-responses": arrays.pulse_responses,
     "repetitions": arrays.repetitions,

@@ -13,6 +13,7 @@ import json
 import sys
 import tempfile
 from collections.abc import Iterable
+from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
@@ -21,7 +22,7 @@ import numpy as np
 from mcap.writer import CompressionType, IndexType, Writer
 from rich.console import Console
 
-from quadriga.agents.planner.acceptance import load_checked
+from quadriga.agents.predictor.gates import load_checked
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.predictor.store import predictor_sha256, save
 from quadriga.identification.predictors import ensure_predictor
@@ -77,10 +78,10 @@ def fit(path: Path) -> None:
     """Fit the predictor and write it with less digits, which makes it a quarter of the size."""
     config = load_config(None, scenario.FITTED_FOR)
     fitted, provenance = load_checked(ensure_predictor(config, Console(stderr=True)), config)
-    predictor = Predictor(fitted.meta, rounded(fitted.G), fitted.condition)
+    predictor = Predictor(fitted.meta, rounded(fitted.G))
     with tempfile.TemporaryDirectory() as folder:
         plain = Path(folder) / "plain.npz"
-        save(plain, predictor, provenance)
+        save(plain, predictor, asdict(provenance))
         with np.load(plain, allow_pickle=False) as archive:
             # As float32, which holds these digits exactly; what is read from it is float64 again.
             np.savez_compressed(path, G=archive["G"].astype("<f4"), document=archive["document"])

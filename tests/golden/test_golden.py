@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from quadriga.agents.planner.acceptance import load_checked
+from quadriga.agents.predictor.gates import load_checked
 from quadriga.shared.codec import decode, encode
 from quadriga.shared.config.sections import Config
 from quadriga.shared.messages import Command, Message, State

@@ -14,7 +14,7 @@ import pytest
 from rich.console import Console
 
 from benchmarks.slow_motion import in_slow_motion
-from quadriga.agents.planner.acceptance import load_checked as load_predictor
+from quadriga.agents.predictor.gates import load_checked as load_predictor
 from quadriga.agents.predictor.store import predictor_sha256
 from quadriga.commands.parser import main
 from quadriga.identification.predictors import ensure_predictor

@@ -9,19 +9,14 @@ from typing import Final
 
 from rich.console import Console
 
-from quadriga.agents.predictor.measured_response import (
-    PulseResponses,
-    plant_of,
-    team_of,
-    write_pulse_responses,
-)
-from quadriga.agents.predictor.predictor import PredictorMeta
+from quadriga.agents.predictor.measured_response import PulseResponses, write_pulse_responses
 from quadriga.experiments.probe.cache import ensure_responses
 from quadriga.experiments.probe.outcome import ProbeOutcome, build_outcome
 from quadriga.experiments.probe.probe_figure import draw_probe
 from quadriga.experiments.probe.probe_tables import build_details, build_overall
 from quadriga.experiments.probe.probed import Probed
 from quadriga.identification.fit_report import write_json
+from quadriga.identification.predictors import measured_team
 from quadriga.shared.config.sections import Config
 from quadriga.shared.runtime.atomic import write_text
 
@@ -56,7 +51,7 @@ def write_outcome(outcome: ProbeOutcome, folder: Path) -> None:
     """Write a probe's figures as JSON, its tables as Markdown, its picture and the responses."""
     write_json(folder / FIGURES, outcome.to_dict())
     measured = outcome.responses
-    team = team_of(PredictorMeta.of(outcome.config)) | plant_of(outcome.config)
+    team = measured_team(outcome.config)
     truth = PulseResponses(measured.ticks, measured.u, measured.y, team)
     write_pulse_responses(folder / RESPONSES, truth)
     draw_probe(outcome, folder / _PICTURE)

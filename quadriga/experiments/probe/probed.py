@@ -8,9 +8,9 @@ from pathlib import Path
 
 from rich.console import Console
 
-from quadriga.agents.planner.acceptance import check_fitted_for, gates_in_force
+from quadriga.agents.predictor.gates import check_fitted_for, gates_in_force, read
 from quadriga.agents.predictor.predictor import Predictor
-from quadriga.agents.predictor.store import predictor_sha256, read
+from quadriga.agents.predictor.store import predictor_sha256
 from quadriga.experiments.variants import PREDICTORS
 from quadriga.identification.predictors import fit_or_read, reason, refusal
 from quadriga.shared.config.load import build, overlay
@@ -46,8 +46,8 @@ def configured_predictor(config: Config, console: Console, name: str = "") -> Pr
     Raises:
         PredictorError: the data are too little or not exciting.
     """
-    predictor, gates = fit_or_read(config, console)
-    refused = reason(refusal(gates, config.planner.kind))
+    predictor, provenance = fit_or_read(config, console)
+    refused = reason(refusal(provenance.gates, config))
     name = name or config.identification.predictor
     return Probed(name, predictor, predictor_sha256(predictor), refused)
 
@@ -80,7 +80,7 @@ def predictor_of_file(path: Path, config: Config) -> Probed:
     predictor, provenance = read(path)
     check_fitted_for(config, path, predictor)
     gates = gates_in_force(provenance.gates, config, predictor)
-    refused = reason(refusal(gates, config.planner.kind))
+    refused = reason(refusal(gates, config))
     return Probed(path.stem, predictor, predictor_sha256(predictor), refused)
 
 

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from benchmarks.as_written import TIGHT, DeepcQp
 from quadriga.agents.planner.deepc_qp import build_model, select
 from quadriga.agents.planner.planner_qp import Condensed, PlannerProblem, constrain
-from quadriga.agents.predictor.deepc import Reduction, reduce
-from quadriga.agents.predictor.episode import U_SCALE, Y_SCALE, Episode
+from quadriga.agents.predictor.episode import U_SCALE, Y_SCALE, Episode, team_layout
 from quadriga.agents.predictor.hankel import hankel
+from quadriga.agents.predictor.regression import Reduction, reduce
 from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config, PlannerConfig
 from quadriga.shared.errors import ConfigError
@@ -63,7 +63,7 @@ def case_of(team: Team, n: int, seed: int, noise: float, step: int = 20) -> Case
     ]
     return Case(
         episodes,
-        reduce(episodes, T_INI, N),
+        reduce(episodes, team_layout(n, T_INI, N)),
         np.concatenate(past),
         (rng.normal(size=(n * N, 6)) * Y_SCALE).ravel(),
         np.stack([horizon_stance(CONFIG, i, step) for i in range(n)]),
@@ -86,7 +86,10 @@ def written_out(
     n = len(case.stance)
     U, Y = (
         np.hstack([hankel(w, T_INI + N) for w in signals])
-        for signals in zip(*(episode.scaled_deviations() for episode in case.episodes), strict=True)
+        for signals in zip(
+            *(each.scaled_deviations(team_layout(n, T_INI, N)) for each in case.episodes),
+            strict=True,
+        )
     )
     (U_p, U_f), (Y_p, Y_f) = (
         (by_robot(X[: T_INI * n * d], n, d), by_robot(X[T_INI * n * d :], n, d))

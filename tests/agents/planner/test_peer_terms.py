@@ -11,12 +11,12 @@ import pytest
 from quadriga.agents.planner.neighbours import HELD, LOST, PeerData, PeerSelection
 from quadriga.agents.planner.peer_terms import PeerTerms
 from quadriga.agents.planner.planner import Planner
-from quadriga.agents.predictor.fits import fit_ridge
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.time_grid import horizon_stance, walking_steps
 from quadriga.shared.config.sections import Config
 from tests.a1 import nominal_forces
 from tests.agents.calm import BASE, NOTHING, STEP, Team, inputs_of, peer, plan, terms_of
+from tests.agents.conftest import fit_ridge
 
 
 def test_the_peers_base_is_that_of_its_own_window(small: Config, predictor: Predictor) -> None:

@@ -13,13 +13,13 @@ from scipy import optimize
 from quadriga.agents.planner.peer_terms import PeerTerms
 from quadriga.agents.planner.planner import Planner, PlannerInputs
 from quadriga.agents.planner.team_planner import build_centralised
-from quadriga.agents.predictor.fits import fit_ridge
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robots.conventions import Array
 from tests.a1 import WEIGHT, nominal_forces
+from tests.agents.conftest import fit_ridge
 
 BASE = np.array([0.26, 0.4, 0.0, 0.0, 0.0, 0.1])
 STEP = 20

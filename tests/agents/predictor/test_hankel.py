@@ -8,15 +8,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quadriga.agents.predictor.hankel import columns, gram, hankel, mosaic, required_samples, split
-from quadriga.agents.predictor.regression import excitation
+from quadriga.agents.predictor.regression import hankel_rank
 
 SEED = st.integers(0, 2**32 - 1)
+NOISE = np.random.default_rng(0).normal(size=(400, 3))
 
 
-def test_hankel_is_equation_2() -> None:
-    u = np.arange(10.0).reshape(5, 2)
+def test_hankel_is_equation_2_and_split_is_equation_4() -> None:
+    u, y = np.arange(12.0).reshape(6, 2), np.arange(6.0)[:, None]
     expected = [[0, 2, 4], [1, 3, 5], [2, 4, 6], [3, 5, 7], [4, 6, 8], [5, 7, 9]]
-    np.testing.assert_array_equal(hankel(u, 3), expected)
+    np.testing.assert_array_equal(hankel(u[:5], 3), expected)
+    parts = split([u], [y], T_ini=2, N=3)
+    np.testing.assert_array_equal(np.vstack([parts.U_p, parts.U_f]), hankel(u, 5))
+    np.testing.assert_array_equal(np.vstack([parts.Y_p, parts.Y_f]), hankel(y, 5))
+    assert (parts.U_p.shape, parts.Y_f.shape) == ((4, 2), (3, 2))
 
 
 @given(SEED, st.integers(1, 4), st.integers(2, 6), st.integers(0, 20))
@@ -34,32 +39,16 @@ def test_the_sliding_gram_matrix_is_that_of_the_explicit_hankel_matrix(
 ) -> None:
     rng = np.random.default_rng(seed)
     signals = [rng.normal(size=(L + extra, q)) for extra in [3, *extras]]
-    H = mosaic(signals, L)
-    assert columns(signals, L) == H.shape[1]
-    np.testing.assert_allclose(gram(signals, L), H @ H.T, atol=1e-10)
-
-
-def test_an_episode_shorter_than_a_column_adds_nothing() -> None:
-    rng = np.random.default_rng(0)
-    long, short = rng.normal(size=(20, 2)), rng.normal(size=(3, 2))
-    np.testing.assert_array_equal(gram([long, short], 5), gram([long], 5))
-    assert columns([long, short], 5) == 16
+    short = rng.normal(size=(L - 1, q))  # has no column
+    H = mosaic([short, *signals], L)
+    assert columns([short, *signals], L) == H.shape[1] == mosaic(signals, L).shape[1]
+    np.testing.assert_allclose(gram([short, *signals], L), H @ H.T, atol=1e-10)
 
 
 def test_no_column_straddles_two_episodes() -> None:
-    first, second = np.full((6, 1), 1.0), np.full((6, 1), 2.0)
-    H = mosaic([first, second], 3)
+    H = mosaic([np.full((6, 1), 1.0), np.full((6, 1), 2.0)], 3)
     assert set(H.ravel()) == {1.0, 2.0}
     assert (np.ptp(H, axis=0) == 0).all()
-
-
-def test_split_is_equation_4() -> None:
-    u, y = np.arange(12.0).reshape(6, 2), np.arange(6.0)[:, None]
-    parts = split([u], [y], T_ini=2, N=3)
-    np.testing.assert_array_equal(np.vstack([parts.U_p, parts.U_f]), hankel(u, 5))
-    np.testing.assert_array_equal(np.vstack([parts.Y_p, parts.Y_f]), hankel(y, 5))
-    assert parts.U_p.shape == (4, 2)
-    assert parts.Y_f.shape == (3, 2)
 
 
 @pytest.mark.parametrize(("robots", "samples"), [(5, 5794), (10, 18754)])
@@ -68,26 +57,14 @@ def test_required_samples_of_large_teams(robots: int, samples: int) -> None:
 
 
 def test_white_noise_excites_up_to_the_rule_and_no_further() -> None:
-    u = np.random.default_rng(0).normal(size=(required_samples(2, 3, 4, 5), 2))
-    assert excitation([u], 12).persistent  # 24 rows, 24 columns
-    starved = excitation([u[:-1]], 12)
-    assert (starved.rank, starved.rows, starved.columns) == (23, 24, 23)
-    assert not starved.persistent
-
-
-def test_several_episodes_excite_together() -> None:
-    u = np.random.default_rng(0).normal(size=(60, 2))
-    assert not excitation([u[:25]], 10).persistent
-    assert excitation([u[:25], u[25:]], 10).persistent
+    u = NOISE[: required_samples(2, 3, 4, 5), :2]
+    assert hankel_rank([u], 12) == 24
+    assert hankel_rank([u[:-1]], 12) == 23
+    assert hankel_rank([NOISE[:25, :2]], 10) < 20
+    assert hankel_rank([NOISE[:25, :2], NOISE[25:60, :2]], 10) == 20, "together they excite"
 
 
 @given(st.floats(0.1, 3.0), st.floats(0.0, 3.0))
-def test_a_sine_excites_order_two(frequency: float, phase: float) -> None:
-    u = np.sin(frequency * np.arange(200) + phase)[:, None]
-    assert excitation([u], 6).rank == 2
-
-
-def test_a_dead_input_is_found() -> None:
-    u = np.random.default_rng(0).normal(size=(400, 3))
-    u[:, 1] = 0.0
-    assert excitation([u], 8).rank == 16
+def test_a_sine_excites_order_two_and_a_dead_input_nothing(frequency: float, phase: float) -> None:
+    assert hankel_rank([np.sin(frequency * np.arange(200) + phase)[:, None]], 6) == 2
+    assert hankel_rank([NOISE * [1.0, 0.0, 1.0]], 8) == 16

@@ -1,24 +1,30 @@
-"""The periodic fit against a team whose response to every wrench at every phase is known."""
+"""The periodic fit against plants whose response at every phase is known, and its parts."""
 
 from __future__ import annotations
 
-import pickle
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from quadriga.agents.gait import nominal_forces, scheduled_stance
-from quadriga.agents.planner.acceptance import run_gates
-from quadriga.agents.predictor.episode import Y_SCALE, Episode, wrench_map
-from quadriga.agents.predictor.fits import fit, fit_periodic, phase_angles
+from quadriga.agents.predictor.episode import N_WRENCH, Y_SCALE, Episode, wrench_map
 from quadriga.agents.predictor.gates import coupling_table, held_out_error
-from quadriga.agents.predictor.periodic import PeriodicFactors
-from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
-from quadriga.agents.predictor.store import Provenance, predictor_sha256, read, save, versions
+from quadriga.agents.predictor.periodic import (
+    PeriodicFactors,
+    harmonics,
+    held_samples,
+    polynomials,
+    shrink,
+    spread_over_samples,
+)
+from quadriga.agents.predictor.predictor import Predictor, PredictorMeta, fit, fit_plant
+from quadriga.agents.predictor.store import load, predictor_sha256, save
+from quadriga.agents.time_grid import gait_phase
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robots.conventions import Array
@@ -56,7 +62,7 @@ class Trotters:
     def respond(self, meta: PredictorMeta, du: Array, first_tick: int) -> Array:
         """Output deviations (T, n, 6) to force deviations (T, n, 12)."""
         w = du @ wrench_map(meta.robot).T
-        angle, y = phase_angles(meta, first_tick, len(du)), np.zeros((self.robots, 6))
+        angle, y = meta.period.angles(first_tick, len(du)), np.zeros((self.robots, 6))
         outputs = []
         for k, now in enumerate(w):
             y = self.forgets * y + np.einsum("ijow,jw->io", self.gain(angle[k]), now)
@@ -71,8 +77,7 @@ class Trotters:
         starts = first_tick - 10 + 10 * np.arange(samples)
         stance = np.stack([scheduled_stance(CONFIG, i, starts) for i in range(self.robots)], axis=1)
         du *= np.repeat(stance, 3, axis=2)
-        meta = meta_of(self.robots)
-        y = self.respond(meta, du, first_tick)
+        y = self.respond(meta_of(self.robots), du, first_tick)
         y += noise * random.normal(size=y.shape) * Y_SCALE
         nominal = nominal_forces(stance, CONFIG.robot.weight)
         return Episode(nominal + du, nominal, y, np.zeros_like(y), first_tick)
@@ -121,14 +126,7 @@ def chain() -> Trotters:
 
 @pytest.fixture(scope="module")
 def fitted(chain: Trotters) -> Predictor:
-    return fit_periodic([chain.episode(seed, 4000) for seed in (1, 2)], meta_of(3))
-
-
-@pytest.fixture
-def provenance(chain: Trotters, fitted: Predictor) -> Provenance:
-    config = replace(CONFIG, team=replace(CONFIG.team, robots=3))
-    gates = run_gates(config, fitted, [chain.episode(8, 100)])
-    return Provenance("abc", (1,), (4000,), (100,), versions(), gates)
+    return fit([chain.episode(seed, 4000) for seed in (1, 2)], meta_of(3))
 
 
 def test_the_response_at_every_phase_is_the_true_one(chain: Trotters, fitted: Predictor) -> None:
@@ -139,25 +137,20 @@ def test_the_response_at_every_phase_is_the_true_one(chain: Trotters, fitted: Pr
         assert error < (0.12 if i == j else 0.25)
 
 
-def test_peers_that_have_no_effect_have_exactly_none(chain: Trotters, fitted: Predictor) -> None:
+def test_what_has_no_effect_has_exactly_none(chain: Trotters, fitted: Predictor) -> None:
+    """Other robots, other outputs, and forces of later samples: none acts backwards."""
     for i in range(3):
         for j in range(3):
             block = fitted.future_block(i, j, 7).reshape(N, 6, -1)
             has_effect = np.any(block, axis=(0, 2))
+            by_sample = np.any(block.reshape(N, 6, N, 12), axis=(1, 3))
+            assert not np.triu(by_sample, 1).any()
             if i == j:
                 assert has_effect.all()
             elif (i, j) in chain.coupled:
                 assert np.flatnonzero(has_effect).tolist() == [VX, VY, ROLL]
             else:
                 assert not has_effect.any()
-
-
-def test_no_force_acts_backwards(fitted: Predictor) -> None:
-    for phase in (0, 13):
-        block = fitted.future_block(1, 0, phase).reshape(N, 6, N, 12)
-        for t in range(N):
-            assert not block[t, :, t + 1 :].any()
-        assert block[N - 1, :, 0].any()
 
 
 def test_held_out_data_are_predicted_up_to_their_noise(chain: Trotters, fitted: Predictor) -> None:
@@ -167,19 +160,10 @@ def test_held_out_data_are_predicted_up_to_their_noise(chain: Trotters, fitted: 
     assert (np.array(rmse) < 0.3 * forgetful).all()
 
 
-def test_forces_that_differ_at_every_sample_do_as_well() -> None:
-    team = Trotters(1, ())
-    predictor = fit_periodic([team.episode(3, 3000, hold=1)], meta_of(1))
-    truth = true_block(team, predictor.meta, 0, 0, 5)
-    found = found_block(predictor, 0, 0, 5)
-    assert np.linalg.norm(found - truth) < 0.12 * np.linalg.norm(truth)
-    assert predictor.meta.phases == 40
-
-
 def test_strangers_are_left_out_if_only_yoked_robots_count() -> None:
     everyone = tuple((i, j) for i in range(3) for j in range(3) if i != j)
     team, meta = Trotters(3, everyone), meta_of(3, yokes="chain", neighbours="yoked")
-    predictor = fit_periodic([team.episode(4, 2000)], meta)
+    predictor = fit([team.episode(4, 2000)], meta)
     for i in range(3):
         for j in range(3):
             assert predictor.couples(i, j) == (abs(i - j) <= 1)
@@ -187,48 +171,160 @@ def test_strangers_are_left_out_if_only_yoked_robots_count() -> None:
 
 
 def test_blocks_rows_and_the_whole_of_G_are_the_same(fitted: Predictor) -> None:
-    G = fitted.G
-    assert G.shape == (40, 3, 3, 6 * N, fitted.meta.width)
-    z = np.random.default_rng(0).normal(size=(3, fitted.meta.width))
+    G, layout = fitted.G, fitted.layout
+    assert G.shape == (40, 3, 3, 6 * N, layout.width)
+    z = np.random.default_rng(0).normal(size=(3, layout.width))
     for phase in (0, 21):
         expected = np.einsum("ijab,jb->ia", G[phase], z)
         np.testing.assert_allclose(fitted.predict(z, phase), expected, rtol=1e-9)
         np.testing.assert_array_equal(
-            fitted.future_block(2, 1, phase), G[phase, 2, 1][:, fitted.meta.past :]
+            fitted.future_block(2, 1, phase), G[phase, 2, 1][:, layout.past :]
         )
     # A few megabytes of factors stand for what would be many times as large.
-    assert fitted.nbytes < 0.2 * G.nbytes
+    assert sum(array.nbytes for array in fitted.arrays().values()) < 0.2 * G.nbytes
     table = coupling_table(fitted)
     assert table.shape == (3, 3)
     assert not table[[0, 2], [2, 0]].any()
 
 
-def test_a_fit_is_repeated_to_the_last_bit(chain: Trotters) -> None:
-    data = [chain.episode(6, 600)]
-    first, second = (fit(data, meta_of(3)) for _ in range(2))
-    assert predictor_sha256(first) == predictor_sha256(second)
-
-
-def test_what_is_saved_is_read(tmp_path: Path, fitted: Predictor, provenance: Provenance) -> None:
-    digest = save(tmp_path / "periodic.npz", fitted, provenance)
-    again, _ = read(tmp_path / "periodic.npz")
+def test_what_is_saved_is_read(tmp_path: Path, fitted: Predictor) -> None:
+    digest = save(tmp_path / "periodic.npz", fitted)
+    again, _ = load(tmp_path / "periodic.npz")
     assert isinstance(again.parts, PeriodicFactors)
     assert predictor_sha256(again) == digest
     np.testing.assert_array_equal(again.block(1, 2, 17), fitted.block(1, 2, 17))
-
-
-def test_another_process_gets_the_same(fitted: Predictor) -> None:
-    again = pickle.loads(pickle.dumps(fitted))
-    assert predictor_sha256(again) == predictor_sha256(fitted)
-    assert again.condition == fitted.condition
-
-
-def test_factors_of_another_team_are_refused(fitted: Predictor) -> None:
-    with pytest.raises(PredictorError, match=r"predictor\.response: got shape"):
+    with pytest.raises(PredictorError, match=r"arrays of \(3,\) agents, expected 2"):
         Predictor(meta_of(2), fitted.parts)
 
 
 def test_data_too_few_to_be_divided_are_refused() -> None:
-    build: Callable[..., Any] = fit_periodic
     with pytest.raises(PredictorError, match="periodic predictor"):
-        build([Trotters(1, ()).episode(1, 16)], meta_of(1))
+        fit([Trotters(1, ()).episode(1, 16)], meta_of(1))
+
+
+# ---- a plant that is no team
+
+PERIOD, PAST, HORIZON, FORGETS = 20, 3, 6, 0.8
+# Three inputs act by two numbers on each of two agents; agent 1 feels agent 0.
+ACTIONS = np.array([[1.0, -1.0, 0.0], [0.5, 0.5, 2.0]])
+
+
+def gain(place: float) -> Array:
+    """From the actions of all agents to the outputs of all, at a place in the period."""
+    wave = np.cos(2 * np.pi * place / PERIOD)
+    own = np.array([[1.0 + 0.6 * wave, 0.2], [-0.3, 0.8 - 0.5 * wave]])
+    across = np.array([[0.6, 0.0], [0.3 * wave, 0.5]])
+    return np.block([[own, np.zeros((2, 2))], [across, own]])
+
+
+def record(seed: int, samples: int, begin: int, hold: int, unit: float) -> Episode:
+    """y_k = 0.8 y_{k−1} + gain(k) w_k under random inputs in some unit, with noise."""
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.normal(size=(samples // hold, 2, 3)), hold, axis=0)
+    outputs, y = [], np.zeros(4)
+    for k, now in enumerate(u):
+        y = FORGETS * y + gain(begin + k) @ (now @ ACTIONS.T).ravel()
+        outputs.append(y.reshape(2, 2) + 0.05 * rng.normal(size=(2, 2)))
+    return Episode.of(unit * u, outputs, begin)
+
+
+@pytest.mark.parametrize(("hold", "unit"), [(1, 1.0), (2, 100.0)])
+def test_the_response_of_any_plant_is_found_at_every_phase(hold: int, unit: float) -> None:
+    data, unseen = record(1, 3000, 7, hold, unit), record(2, 400, 3, 1, unit)
+    predictor = fit_plant([data], "periodic", PAST, HORIZON, period=PERIOD, input_map=ACTIONS)
+    assert predictor.phases == PERIOD
+    timeless = fit_plant([data], "ridge", PAST, HORIZON)
+    assert held_out_error(predictor, [unseen])[3] < 0.5 * held_out_error(timeless, [unseen])[3]
+    assert not predictor.couples(0, 1), "agent 1 does nothing to agent 0"
+    for phase in (0, 13):
+        forced = unit * predictor.future_block(1, 0, phase).reshape(HORIZON, 2, HORIZON, 3)
+        true = np.zeros_like(forced)
+        for s in range(HORIZON):
+            for t in range(s, HORIZON):
+                true[t, :, s] = FORGETS ** (t - s) * gain(phase + s)[2:, :2] @ ACTIONS
+        assert np.linalg.norm(forced - true) < 0.2 * np.linalg.norm(true)
+    # The horizon begins with sample 3 + 40 of this episode.
+    past, ahead = slice(40 - PAST, 40), slice(40, 40 + HORIZON)
+    u, y = unseen.u, unseen.y
+    forecast = predictor.forecast(u[past], y[past], u[ahead], phase=43)
+    assert np.abs(forecast - y[ahead]).max() < 0.5 < np.abs(y[ahead]).max()
+
+
+# ---- parts
+
+
+@given(order=st.integers(0, 8))
+def test_harmonics_are_orthonormal_over_a_period(order: int) -> None:
+    F = harmonics(2 * np.pi * np.arange(40) / 40, order)
+    np.testing.assert_allclose(F.T @ F / 40, np.eye(2 * order + 1), atol=1e-12)
+
+
+@given(degree=st.integers(0, 5))
+def test_polynomials_are_orthonormal_and_of_one_half_each(degree: int) -> None:
+    nodes, weights = np.polynomial.legendre.leggauss(degree + 2)
+    angle = np.concatenate([np.pi * (nodes + 1) / 2, np.pi + np.pi * (nodes + 1) / 2])
+    F = polynomials(angle, degree)
+    gram = F.T @ (np.tile(weights, 2)[:, None] / 4 * F)
+    np.testing.assert_allclose(gram, np.eye(2 * degree + 2), atol=1e-4)  # angles are nudged by 1e-6
+    assert not F[: degree + 2, degree + 1 :].any()
+    assert not F[degree + 2 :, : degree + 1].any()
+
+
+def test_a_half_begins_where_the_feet_change_whatever_the_rounding() -> None:
+    """Phases 0 and 20 of 40, and those of later periods."""
+    phases = np.array([0, 20, 40, 60, 80, 100, 119, 120])
+    first = polynomials(2 * np.pi * phases / 40, 0)[:, 0] > 0.0
+    assert first.tolist() == [True, False, True, False, True, False, False, True]
+
+
+def test_a_samples_angle_is_that_of_the_phase_it_begins_in() -> None:
+    """Sample 0 ends at `first_tick`; a plan at tick t begins with the sample after it."""
+    meta = meta_of(1)
+    for k, angle in enumerate(meta.period.angles(first_tick=1010, count=100)):
+        phase = gait_phase(1000 + 10 * k, meta.stand_ms, meta.stance_ms, 40)
+        assert angle == pytest.approx(2 * np.pi * phase / 40)
+    assert meta.period.angle_step == pytest.approx(2 * np.pi / 40)
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=st.integers(0, 2**31), hold=st.integers(1, 3))
+def test_single_samples_add_up_to_a_held_draw(seed: int, hold: int) -> None:
+    """A response that is smooth in its lag is found again from that to held draws."""
+    random, step, N = np.random.default_rng(seed), 2 * np.pi / 40, 25
+    decay = np.exp(-0.1 * np.arange(N))[:, None] * np.cos(0.2 * np.arange(N))[:, None]
+    h = random.normal(size=(6, 1, 4)) * decay
+    starts = np.array([k for k in range(40) if k % 20 + hold <= 20]) * step
+    F = polynomials(starts, 2)  # of draws that end in the half in which they begin
+    held = np.zeros((len(starts), N, 4))
+    for m in range(hold):
+        response = np.tensordot(polynomials(starts + m * step, 2), h, axes=1)
+        held[:, m:] += response[:, : N - m]
+    g = np.tensordot(np.linalg.pinv(F), held, axes=1)
+    found = spread_over_samples(g, hold, step)
+    assert np.linalg.norm(found - h) < 0.05 * np.linalg.norm(h)
+
+
+@given(hold=st.integers(1, 5), begin=st.integers(0, 4))
+def test_how_long_forces_are_held_is_found_in_the_data(hold: int, begin: int) -> None:
+    random, T = np.random.default_rng(hold), 120
+    u = np.repeat(random.normal(size=(T, 1, 12)), hold, axis=0)[hold - begin % hold :][:T]
+    assert held_samples([u]) == held_samples([u, 0.0 * u]) == hold
+
+
+@settings(max_examples=10, deadline=None)
+@given(seed=st.integers(0, 2**31))
+def test_noise_is_no_effect_of_peers_and_what_is_clear_is_left_as_it_is(seed: int) -> None:
+    random, F, n = np.random.default_rng(seed), 10, 2
+    shape = (5, 6, n, N_WRENCH, n, 6)
+    truth = np.zeros(shape)
+    truth[:, :, range(n), :, range(n)] = random.normal(size=(n, 5, 6, N_WRENCH, 6))
+    truth[:, :, 0, :, 1, 2] = 0.5 * random.normal(size=(5, 6, N_WRENCH))  # robot 1, output vy
+    folds = truth + 0.02 * random.normal(size=(F, *shape))
+    estimate = folds.mean(axis=0)
+    response, kept = shrink(estimate, (F * estimate - folds) / (F - 1))
+    expected = np.zeros((n, n, 6), dtype=bool)
+    expected[range(n), range(n)] = True
+    expected[1, 0, 2] = True
+    np.testing.assert_array_equal(kept, expected)
+    assert np.linalg.norm(response - truth) < 0.05 * np.linalg.norm(truth)
+    assert not response[:, :, 1, :, 0].any()

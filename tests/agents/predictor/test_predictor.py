@@ -1,4 +1,4 @@
-"""Predictors against the true response of a known linear team."""
+"""Layouts, predictors and fits: of a known linear team, and of a plant that is no team."""
 
 from __future__ import annotations
 
@@ -9,23 +9,24 @@ from typing import Any
 import numpy as np
 import pytest
 
-from quadriga.agents.predictor.episode import U_SCALE, Y_SCALE, Layout, everyone, scales
-from quadriga.agents.predictor.fits import fit_pinv, fit_ridge
-from quadriga.agents.predictor.hankel import split
-from quadriga.agents.predictor.predictor import PredictorMeta
+from quadriga.agents.predictor.episode import U_SCALE, Y_SCALE, Episode, everyone, wrench_map
+from quadriga.agents.predictor.predictor import KINDS, PredictorMeta, fit, fit_plant
+from quadriga.agents.predictor.store import predictor_sha256
 from quadriga.shared.config.sections import Config, TeamConfig
+from quadriga.shared.errors import PredictorError
+from quadriga.shared.robots.registry import ROBOTS
+from quadriga.shared.runtime.blas import use_one_blas_thread
+from tests.agents.conftest import fit_ridge
+from tests.agents.predictor.plants import Sizes, first_window, random_plant, record
 
 Team = Callable[..., Any]
-
-
-def meta_of(config: Config, **changes: Any) -> PredictorMeta:
-    return replace(PredictorMeta.of(config), **changes)
+TEAM = PredictorMeta.of(Config(team=TeamConfig(robots=4)))
 
 
 def test_the_response_to_a_pulse_is_the_plants(small: Config, linear_team: Team) -> None:
     """Feedthrough included: u_k acts on y_k, which is taken at the end of the same sample."""
     team = linear_team(2)
-    meta = meta_of(small, ridge=1e-10, block_weight=1.0)
+    meta = replace(PredictorMeta.of(small), ridge=1e-10, block_weight=1.0)
     predictor = fit_ridge([team.episode(1500, 1)], meta)
     for j in range(2):
         du = np.zeros((meta.N, 2, 12))
@@ -38,58 +39,15 @@ def test_the_response_to_a_pulse_is_the_plants(small: Config, linear_team: Team)
             assert np.abs(error).max() < 1e-6
 
 
-def test_the_blocks_sum_to_the_full_G(small: Config, linear_team: Team) -> None:
-    """Eq. 9, 10 against Y_f [U_p; Y_p; U_f]† of the whole team, written out from eq. 6."""
-    team = linear_team(2)
-    data = team.episode(700, 3, noise=0.3)
-    predictor = fit_pinv([data], meta_of(small))
-    T_ini, N = predictor.meta.T_ini, predictor.meta.N
-    u, y = data.scaled_deviations()
-    parts = split([u], [y], T_ini, N)
-    G = parts.Y_f @ np.linalg.pinv(np.vstack([parts.U_p, parts.Y_p, parts.U_f]))
-    du, dy = data.deviations()
-    k = 123
-    past, future = slice(k, k + T_ini), slice(k + T_ini, k + T_ini + N)
-    whole = G @ np.concatenate([u[past].ravel(), y[past].ravel(), u[future].ravel()])
-    whole = whole.reshape(N, 2, 6) * Y_SCALE
-    for i in range(2):
-        blocks = sum(
-            predictor.block(i, j)
-            @ np.concatenate([du[past, j].ravel(), dy[past, j].ravel(), du[future, j].ravel()])
-            for j in range(2)
-        )
-        np.testing.assert_allclose(blocks.reshape(N, 6), whole[:, i], atol=1e-9)
-
-
-def test_block_weighted_ridge_solves_its_normal_equations(small: Config, linear_team: Team) -> None:
-    """Gradient of the penalised least-squares cost, from the explicit windows, is zero."""
-    team = linear_team(2)
-    data = team.episode(400, 4, noise=0.3)
-    meta = meta_of(small, ridge=1e-2, block_weight=7.0)
-    predictor = fit_ridge([data], meta)
-    z, y = data.windows(meta.T_ini, meta.N)
-    z_scale = np.concatenate(
-        [np.full(12 * meta.T_ini, U_SCALE), np.tile(Y_SCALE, meta.T_ini), np.full(96, U_SCALE)]
-    )
-    y_scale = np.tile(Y_SCALE, meta.N)[:, None]
-    Z, count = z / z_scale[:, None], z.shape[2]
-    for i in range(2):
-        rows = [predictor.block(i, j) * z_scale / y_scale for j in range(2)]
-        residual = y[i] / y_scale - sum(G @ Zj for G, Zj in zip(rows, Z, strict=True))
-        for j in range(2):
-            penalty = 1e-2 * count * (1.0 if i == j else 49.0)
-            np.testing.assert_allclose(residual @ Z[j].T, penalty * rows[j], atol=1e-7)
-
-
-def test_fits_are_reproducible_and_read_only(small: Config, linear_team: Team) -> None:
-    data = [linear_team(2).episode(300, 6, noise=0.3)]
-    first, second = (fit_ridge(data, meta_of(small)) for _ in range(2))
-    np.testing.assert_array_equal(first.G, second.G)
+@pytest.mark.parametrize("kind", KINDS)
+def test_fits_are_reproducible_and_read_only(kind: str, small: Config, linear_team: Team) -> None:
+    use_one_blas_thread()
+    data, meta = [linear_team(2).episode(500, 6, noise=0.3)], PredictorMeta.of(small)
+    meta = replace(meta, kind=kind)
+    first, second = (fit(data, meta) for _ in range(2))
+    assert predictor_sha256(first) == predictor_sha256(second)
     with pytest.raises(ValueError, match="read-only"):
-        first.block(0, 1)[0, 0] = 1.0
-
-
-TEAM = PredictorMeta.of(Config(team=TeamConfig(robots=4)))
+        next(iter(first.arrays().values()))[0, 0, 0] = 1.0
 
 
 @pytest.mark.parametrize(
@@ -105,27 +63,95 @@ TEAM = PredictorMeta.of(Config(team=TeamConfig(robots=4)))
 def test_members_are_the_robot_itself_and_whoever_explains_it(
     yokes: str, neighbours: str, members: tuple[tuple[int, ...], ...]
 ) -> None:
-    layout = replace(TEAM, yokes=yokes, neighbours=neighbours).layout
-    assert layout.members == members
-    assert layout.strangers(0) == [j for j in range(4) if j not in members[0]]
+    assert replace(TEAM, yokes=yokes, neighbours=neighbours).layout.members == members
 
 
 def test_sizes_and_scales_are_the_team_s() -> None:
-    layout = TEAM.layout
-    assert (layout.agents, layout.width, layout.past) == (4, TEAM.width, TEAM.past)
-    assert layout.rows == 6 * TEAM.N
-    z_scale, y_scale = scales(layout)
-    np.testing.assert_array_equal(z_scale[: 12 * TEAM.T_ini], U_SCALE)
-    np.testing.assert_array_equal(
-        z_scale[12 * TEAM.T_ini : TEAM.past], np.tile(Y_SCALE, TEAM.T_ini)
-    )
-    np.testing.assert_array_equal(z_scale[TEAM.past :], U_SCALE)
+    layout, T_ini = TEAM.layout, TEAM.T_ini
+    assert (layout.past, layout.rows) == (18 * T_ini, 6 * TEAM.N)
+    z_scale, y_scale = layout.scales()
+    np.testing.assert_array_equal(z_scale[: 12 * T_ini], U_SCALE)
+    np.testing.assert_array_equal(z_scale[12 * T_ini : layout.past], np.tile(Y_SCALE, T_ini))
+    np.testing.assert_array_equal(z_scale[layout.past :], np.full(12 * TEAM.N, U_SCALE))
     np.testing.assert_array_equal(y_scale, np.tile(Y_SCALE, TEAM.N))
 
 
-def test_the_scales_of_any_plant_repeat_for_every_sample() -> None:
-    layout = Layout(1, 2, 1, 2, 3, (1.0, 10.0), (5.0,), everyone(1))
-    z_scale, y_scale = scales(layout)
-    assert z_scale.tolist() == [1, 10, 1, 10, 5, 5, 1, 10, 1, 10, 1, 10]
-    assert y_scale.tolist() == [5, 5, 5]
-    assert (layout.past, layout.width, layout.rows) == (6, 12, 3)
+@pytest.mark.parametrize("kind", ROBOTS)
+def test_the_wrench_is_that_of_the_forces_at_the_feet(kind: str) -> None:
+    force = np.random.default_rng(1).normal(size=(4, 3))
+    feet = np.column_stack([ROBOTS[kind].feet_under_hips, np.zeros(4)])
+    wrench, unit = wrench_map(kind) @ force.ravel(), wrench_map(kind)[0, 0]
+    np.testing.assert_allclose(wrench[:3], force.sum(axis=0) * unit)
+    moment, lever = np.cross(feet, force).sum(axis=0), np.linalg.norm(feet[0])
+    np.testing.assert_allclose(wrench[3:], moment * unit / lever, atol=1e-12)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_data_that_no_fit_can_use_are_refused_by_name(
+    kind: str, small: Config, linear_team: Team
+) -> None:
+    meta, good = replace(PredictorMeta.of(small), kind=kind), linear_team(2).episode(100, 16)
+    with pytest.raises(PredictorError, match="at least one"):
+        fit([], meta)
+    with pytest.raises(PredictorError, match=r"got \(agents, inputs, outputs\) = \(2, 12, 6\)"):
+        fit([good], replace(meta, robots=3))
+    short = Episode(good.u[:6], good.u_nominal[:6], good.y[:6], good.y_base[:6], 410)
+    with pytest.raises(PredictorError, match="got 6 samples, expected at least 12"):
+        fit([good, short], meta)
+
+
+# ---- any plant
+
+
+def test_a_plant_of_one_agent_needs_no_axis_of_agents() -> None:
+    sizes = Sizes(1, 2, 3, 3)
+    (data,) = record(random_plant(sizes, 7), sizes, (200,), 8)
+    flat = Episode.of(data.u[:, 0], data.y[:, 0].tolist())
+    whole, single = (fit_plant([each], "pinv", 3, 4) for each in (data, flat))
+    np.testing.assert_array_equal(whole.G, single.G)
+    past_u, past_y, future_u, _ = first_window(data, 3, 4)
+    np.testing.assert_array_equal(
+        single.forecast(past_u[:, 0], past_y[:, 0], future_u[:, 0]),
+        whole.forecast(past_u, past_y, future_u)[:, 0],
+    )
+    with pytest.raises(PredictorError, match=r"past_u: got shape \(4, 1, 2\), expected \(3, 1, 2"):
+        whole.forecast(future_u, past_y, future_u)
+
+
+U, Y = np.random.default_rng(0).normal(size=(100, 2)), np.zeros((100, 1))
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"kind": "pinw"}, "did you mean 'pinv'"),
+        ({"T_ini": 0}, "T_ini, N, ridge, block_weight: got 0, 4"),
+        ({"kind": "ridge", "ridge": -1.0}, "T_ini, N, ridge"),
+        ({"N": 98}, "got 100 samples, expected at least 101"),
+        ({"N": 40}, "rank 58, expected rank 86: persistently exciting of order 43"),
+        ({"kind": "ridge", "ridge": 0.0, "N": 40}, "persistently exciting"),
+        ({"kind": "periodic"}, "period: got 1 of 'periodic'"),
+        ({"period": 10}, "period: got 10 of 'pinv'"),
+        ({"kind": "periodic", "period": 10, "input_map": np.eye(3)}, r"input_map: got shape"),
+        ({"episodes": []}, "episodes: got none"),
+        ({"episodes": [Episode.of(U, Y), Episode.of(U[:, :1], Y)]}, "of another plant"),
+    ],
+)
+def test_what_cannot_be_fitted_is_refused_by_name(changes: dict[str, Any], text: str) -> None:
+    arguments: dict[str, Any] = {"episodes": [Episode.of(U, Y)], "T_ini": 3, "N": 4}
+    with pytest.raises(PredictorError, match=text):
+        fit_plant(**(arguments | changes))
+
+
+@pytest.mark.parametrize(
+    ("u", "y", "text"),
+    [
+        (U, Y[:20], r"episode\.y: got shape \(20, 1, 1\)"),
+        (U[:, 0], Y, r"u: got shape \(100,\)"),
+        (U * np.inf, Y, r"episode\.u: got NaN or infinity"),
+        ([["a"]], Y, "an array of numbers"),
+    ],
+)
+def test_signals_that_do_not_belong_together_are_refused(u: Any, y: Any, text: str) -> None:
+    with pytest.raises(PredictorError, match=text):
+        Episode.of(u, y)

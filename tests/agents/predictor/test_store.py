@@ -6,7 +6,7 @@ import json
 import zipfile
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +15,13 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from quadriga.agents.predictor.predictor import Predictor
-from quadriga.agents.predictor.store import Provenance, predictor_sha256, read, save
+from quadriga.agents.predictor.gates import Provenance, read
+from quadriga.agents.predictor.predictor import Predictor, fit_plant
+from quadriga.agents.predictor.store import load, predictor_sha256, save
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.runtime import npz
+from tests.agents.predictor.plants import Sizes, random_plant, record
+
+WRONG = "expected a predictor that quadriga wrote"
 
 
 def test_what_is_saved_is_read(stored: Path, fitted: tuple[Predictor, Provenance]) -> None:
@@ -28,11 +31,24 @@ def test_what_is_saved_is_read(stored: Path, fitted: tuple[Predictor, Provenance
     assert provenance == fitted[1]
     assert {"python", "numpy", "scipy"} <= provenance.versions.keys()
     assert list(stored.parent.iterdir()) == [stored]
+    assert sorted(zipfile.ZipFile(stored).namelist()) == ["G.npy", "document.npy"]
+
+
+def test_a_predictor_of_any_plant_is_loaded_and_is_none_of_a_team(tmp_path: Path) -> None:
+    sizes, path = Sizes(2, 1, 2, 3), tmp_path / "new" / "plant.npz"
+    data = record(random_plant(sizes, 1), sizes, (200,), 2, 0.1)
+    predictor = fit_plant(data, "ridge", 3, 4)
+    digest = save(path, predictor)
+    again, provenance = load(path)
+    assert (again.meta, predictor_sha256(again), provenance) == (predictor.meta, digest, None)
+    np.testing.assert_array_equal(again.G, predictor.G)
+    with pytest.raises(PredictorError, match=WRONG):
+        read(path)
 
 
 def test_the_digest_is_of_the_content(tmp_path: Path, fitted: tuple[Predictor, Provenance]) -> None:
     predictor, provenance = fitted
-    elsewhere = replace(provenance, config_digest="another machine")
+    elsewhere = asdict(replace(provenance, config_digest="another machine"))
     digests = {save(tmp_path / name, predictor, elsewhere) for name in ("a.npz", "b.npz")}
     assert digests == {predictor_sha256(predictor)}
     assert read(tmp_path / "a.npz")[1].config_digest == "another machine"
@@ -50,11 +66,11 @@ def test_a_file_that_is_no_predictor(tmp_path: Path, content: bytes) -> None:
     np.savez(tmp_path / "y.npz", A=np.eye(3))
     np.savez(tmp_path / "z.npz", G=np.eye(3), document=np.array("[1, 2]"))
     for wrong in (path, tmp_path, tmp_path / "y.npz", tmp_path / "z.npz"):
-        with pytest.raises(PredictorError, match="expected a predictor that quadriga wrote"):
+        with pytest.raises(PredictorError, match=WRONG):
             read(wrong)
 
 
-@pytest.mark.parametrize("kept", [0.1, 0.5, 0.95, 0.999])
+@pytest.mark.parametrize("kept", [0.1, 0.95, 0.999])
 def test_a_truncated_file(stored: Path, kept: float) -> None:
     content = stored.read_bytes()
     stored.write_bytes(content[: int(kept * len(content))])
@@ -66,11 +82,13 @@ def test_a_truncated_file(stored: Path, kept: float) -> None:
     ("change", "message"),
     [
         (lambda document: document["meta"].update(stance_ms=150), "digest does not match"),
+        (lambda document: document["meta"].update(unknown=150), WRONG),
         (lambda document: document.update(format=1), "got format 1, expected format 3"),
-        (lambda document: document["provenance"].update(gates={}), "expected a predictor that"),
-        (lambda document: document.pop("sha256"), "expected a predictor that quadriga wrote"),
+        (lambda document: document["provenance"].update(gates={}), WRONG),
+        (lambda document: document.pop("sha256"), WRONG),
+        (lambda document: [document.clear(), document.update(a="[" * 100_000)], WRONG),
     ],
-    ids=["content", "format", "gates", "digest"],
+    ids=["content", "field", "format", "gates", "digest", "text"],
 )
 def test_a_document_that_was_changed(
     stored: Path, change: Callable[[dict[str, Any]], None], message: str
@@ -78,7 +96,7 @@ def test_a_document_that_was_changed(
     with np.load(stored) as archive:
         G, document = archive["G"], json.loads(str(archive["document"]))
     change(document)
-    np.savez(stored, G=G, document=np.array(json.dumps(document)))
+    np.savez(stored, G=G, document=np.array(document.get("a") or json.dumps(document)))
     with pytest.raises(PredictorError, match=message):
         read(stored)
 
@@ -88,25 +106,17 @@ def test_a_place_that_cannot_be_written(
 ) -> None:
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(PredictorError, match="expected a file that can be written"):
-        save(tmp_path / "file" / "predictor.npz", *fitted)
-
-
-def test_the_file_is_an_ordinary_archive(stored: Path) -> None:
-    assert sorted(zipfile.ZipFile(stored).namelist()) == ["G.npy", "document.npy"]
+        save(tmp_path / "file" / "predictor.npz", fitted[0])
 
 
 @pytest.mark.parametrize(
     ("header", "body"),
     [
-        ("{'descr': '<f8', 'fortran_order': False, 'shape': (1 << 40, 8), }", b""),
         ("{'descr': '<f8', 'fortran_order': False, 'shape': (1099511627776, 8), }", b""),
-        ("{'descr': '<f8', 'fortran_order': False, 'shape': (9223372036854775807, 8), }", b""),
-        ("{'descr': '<f8', 'fortran_order': False, 'shape': (2, 2L), }", bytes(32)),
-        ("{'descr': '<f8', 'fortran_order': False, 'shape': (3, ", b""),
         ("{'descr': '|O', 'fortran_order': False, 'shape': (1,), }", b""),
         ("(" * 3000, b""),
     ],
-    ids=["shift", "8 TiB", "overflow", "python 2", "cut", "objects", "deep"],
+    ids=["8 TiB", "objects", "deep"],
 )
 def test_an_array_that_declares_what_it_is_not(stored: Path, header: str, body: bytes) -> None:
     text = header.encode() + b"\n"
@@ -116,27 +126,7 @@ def test_an_array_that_declares_what_it_is_not(stored: Path, header: str, body: 
     with zipfile.ZipFile(stored, "w") as archive:
         archive.writestr("document.npy", document)
         archive.writestr("G.npy", damaged)
-    with pytest.raises(PredictorError, match="expected a predictor that quadriga wrote"):
-        read(stored)
-
-
-def test_a_document_that_nests_too_deeply(stored: Path) -> None:
-    with np.load(stored) as archive:
-        G = archive["G"]
-    for text in ("[" * 100_000, '{"a":' * 100_000, "9" * 5000):
-        np.savez(stored, G=G, document=np.array(text))
-        with pytest.raises(PredictorError, match="expected a predictor that quadriga wrote"):
-            read(stored)
-
-
-def test_an_archive_of_more_than_any_predictor_holds(
-    stored: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(npz, "_LARGEST", 10_000_000)
-    read(stored)
-    with zipfile.ZipFile(stored, "a", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr("A.npy", bytes(10_000_000))
-    with pytest.raises(PredictorError, match="expected a predictor that quadriga wrote"):
+    with pytest.raises(PredictorError, match=WRONG):
         read(stored)
 
 

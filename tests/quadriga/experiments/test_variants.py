@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from quadriga.agents.predictor.fits import FITS
+from quadriga.agents.predictor.predictor import KINDS
 from quadriga.experiments.variants import (
     PLANNERS,
     PREDICTORS,
@@ -35,7 +35,7 @@ def test_every_set_builds_a_configuration_of_its_own(variants: Mapping[str, Keys
 
 
 def test_every_fit_there_is_can_be_compared() -> None:
-    assert set(FITS) < set(PREDICTORS)
+    assert set(KINDS) < set(PREDICTORS)
 
 
 def test_every_planner_walks_with_every_predictor_and_nobody_with_none() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -13,24 +13,21 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from rich.console import Console
 
-from quadriga.agents.predictor.fits import FITS
-from quadriga.agents.predictor.fits import fit as fit_predictor
-from quadriga.agents.predictor.gates import held_out_error
-from quadriga.agents.predictor.predictor import PredictorMeta
-from quadriga.agents.predictor.store import read
+from quadriga.agents.predictor.gates import read
+from quadriga.agents.predictor.predictor import KINDS
 from quadriga.commands.parser import main
 from quadriga.identification import fit_report
 from quadriga.identification.cache import predictor_path
 from quadriga.identification.fit_report import (
     FitReport,
-    HorizonErrors,
     Unfit,
     build_comparison,
     build_report_tables,
-    horizon_errors,
     report_fit,
 )
+from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robots.conventions import OUTPUTS
 from tests.quadriga.linear_data import arguments, config_of, dataset, put_data
@@ -47,32 +44,31 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         yield folder
 
 
+def reported(config: Config) -> FitReport:
+    kind = config.identification.predictor
+    report = report_fit(config, dataset(), kind, Console(stderr=True))
+    assert isinstance(report, FitReport)
+    return report
+
+
 @pytest.mark.parametrize("kind", ["ridge", "periodic"])
 def test_errors_over_the_horizon_make_up_the_error_of_the_gates(kind: str) -> None:
-    data, config = dataset(), config_of(identification__predictor=kind)
-    predictor = fit_predictor(data.training, PredictorMeta.of(config))
-    found = horizon_errors(predictor, data.held_out)
-    _, rmse, persistence, _ = held_out_error(predictor, data.held_out)
-    assert found.rmse.shape == found.persistence.shape == (8, 6)
-    np.testing.assert_allclose(np.sqrt((found.rmse**2).mean(axis=0)), rmse, rtol=1e-12)
-    np.testing.assert_allclose(np.sqrt((found.persistence**2).mean(axis=0)), persistence)
+    found = reported(config_of(identification__predictor=kind))
+    for errors, gates in (
+        (found.rmse, found.gates.rmse),
+        (found.persistence, found.gates.rmse_persistence),
+    ):
+        assert errors.shape == (8, 6)
+        whole = np.sqrt((errors**2).mean(axis=0))
+        np.testing.assert_allclose(whole, list(gates.values()), rtol=1e-12)
 
 
 def test_persistence_is_the_change_since_the_last_sample() -> None:
     """Against the definition written out for one sample of the horizon."""
-    data = dataset()
-    predictor = fit_predictor(data.training, PredictorMeta.of(config_of()))
-    y = data.held_out[0].y
+    y = dataset().held_out[0].y
     last, third = y[3 : len(y) - 8], y[3 + 3 : len(y) - 8 + 3]
     expected = np.sqrt(((third - last) ** 2).mean(axis=(0, 1)))
-    np.testing.assert_allclose(horizon_errors(predictor, data.held_out).persistence[2], expected)
-
-
-def test_held_out_data_that_are_too_short_are_an_error() -> None:
-    data = dataset()
-    predictor = fit_predictor(data.training, PredictorMeta.of(config_of()))
-    with pytest.raises(PredictorError, match="at least 12 samples"):
-        horizon_errors(predictor, dataset(11).held_out)
+    np.testing.assert_allclose(reported(config_of()).persistence[2], expected)
 
 
 def test_the_report_is_printed_and_kept_beside_the_predictor(capsys: Said) -> None:
@@ -80,13 +76,13 @@ def test_the_report_is_printed_and_kept_beside_the_predictor(capsys: Said) -> No
     out = capsys.readouterr().out
     path = predictor_path(config_of())
     assert out.splitlines()[-1] == str(path)
-    for phrase in ("best-response radius", "persistence", "Coupling", "digest", "seeds 5–6"):
+    for phrase in ("best-response radius", "persistence", "Coupling", "digest", "seeds 5 … 6"):
         assert phrase in out
     kept = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
     predictor, provenance = read(path)
     assert kept["refused"] == ""
-    assert kept["fit_seconds"] > 0.0
-    assert kept["provenance"]["gates"] == json.loads(json.dumps(provenance.gates.to_dict()))
+    assert kept["provenance"]["fit_seconds"] > 0.0
+    assert kept["provenance"] == json.loads(json.dumps(asdict(provenance)))
     assert kept["sha256"][:16] in out
     assert {name: len(found) for name, found in kept["horizon"]["rmse"].items()} == dict.fromkeys(
         OUTPUTS, predictor.meta.N
@@ -123,11 +119,8 @@ def test_every_predictor_is_compared_and_the_refused_ones_are_not_hidden(capsys:
     """Between the radii of two fits of the same data lies a limit that refuses one of them."""
     weight = {"identification__block_weight": 1000.0}
     weighted, plain = (
-        report_fit(config_of(**weight, identification__predictor=kind), dataset(), kind)
-        for kind in ("ridge", "pinv")
+        reported(config_of(**weight, identification__predictor=kind)) for kind in ("ridge", "pinv")
     )
-    assert isinstance(weighted, FitReport)
-    assert isinstance(plain, FitReport)
     limit = (weighted.gates.radius + plain.gates.radius) / 2
     limits = weight | {"identification__max_radius": limit}
     config = config_of(**limits)
@@ -138,7 +131,7 @@ def test_every_predictor_is_compared_and_the_refused_ones_are_not_hidden(capsys:
     assert out.splitlines()[-1] == str(path)
     kept = json.loads(path.with_name(f"{path.stem}-all.json").read_text(encoding="utf-8"))
     by_name = {report["predictor"]: report for report in kept}
-    assert list(by_name) == list(FITS)
+    assert list(by_name) == list(KINDS)
     assert by_name["ridge"]["refused"] == ""
     assert "radius" in by_name["pinv"]["refused"]
     for name, report in by_name.items():
@@ -150,8 +143,7 @@ def test_every_predictor_is_compared_and_the_refused_ones_are_not_hidden(capsys:
 
 
 def test_what_cannot_be_fitted_at_all_is_a_row_with_the_reason() -> None:
-    report = report_fit(config_of(), dataset(), "ridge")
-    assert isinstance(report, FitReport)
+    report = reported(config_of())
     singular = Unfit("pinv", PredictorError("normal equations", "a pivot of 0", "positive"))
     table = build_comparison([report, singular])
     assert all(len(row) == len(table.columns) for row in table.rows)
@@ -161,16 +153,17 @@ def test_what_cannot_be_fitted_at_all_is_a_row_with_the_reason() -> None:
         assert all(len(row) == len(sheet.columns) for row in sheet.rows)
 
 
-def test_data_that_do_not_excite_are_an_error_not_a_report() -> None:
-    data = dataset()
-    still = tuple(replace(episode, u=episode.u_nominal.copy()) for episode in data.training)
-    with pytest.raises(PredictorError, match="persistently exciting"):
-        report_fit(config_of(identification__ridge=2e-6), replace(data, training=still), "ridge")
+def test_data_that_do_not_excite_fit_nothing() -> None:
+    still = tuple(replace(episode, u=episode.u_nominal.copy()) for episode in dataset().training)
+    config, data = config_of(identification__ridge=2e-6), replace(dataset(), training=still)
+    found = report_fit(config, data, "ridge", Console(stderr=True))
+    assert isinstance(found, Unfit)
+    assert "persistently exciting" in found.refused.expected
 
 
 def test_degrees_stand_beside_milliradians(monkeypatch: pytest.MonkeyPatch) -> None:
-    errors = HorizonErrors(np.full((5, 6), 0.02), np.full((5, 6), np.deg2rad(2.0)))
-    report = cast(FitReport, SimpleNamespace(name="ridge", refused=None, horizon=errors))
+    errors = {"rmse": np.full((5, 6), 0.02), "persistence": np.full((5, 6), np.deg2rad(2.0))}
+    report = cast(FitReport, SimpleNamespace(name="ridge", refused=None, **errors))
     drawn = list[Figure]()
     monkeypatch.setattr(fit_report, "save_png", lambda figure, _path: drawn.append(figure))
     fit_report.draw([report], Path("fit.png"))

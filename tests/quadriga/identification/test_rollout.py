@@ -132,5 +132,5 @@ def test_excitation_reaches_the_robot_it_is_meant_for() -> None:
 
 def test_a_controller_of_ones_own_does_not_walk_in_this_process() -> None:
     config = load(None, {"team.robots": 1, "team.agent_command": "walk"})
-    with pytest.raises(ConfigError, match=r"team\.controller: got 'walk', expected '': agents"):
+    with pytest.raises(ConfigError, match=r"team\.agent_command: got 'walk', expected '': agents"):
         build_agents(config, None)

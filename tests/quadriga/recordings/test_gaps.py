@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from quadriga.agents.planner.acceptance import load_checked
+from quadriga.agents.predictor.gates import load_checked
 from quadriga.recordings.gaps import missing_ticks, repeated_ticks
 from quadriga.shared.codec import decode
 from quadriga.shared.config.load import load

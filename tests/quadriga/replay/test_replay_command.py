@@ -12,9 +12,8 @@ from rich.console import Console
 from quadriga.agents.agent import Agent
 from quadriga.agents.inbox.inbox import Inbox
 from quadriga.agents.inbox.intake_log import Intake
-from quadriga.agents.predictor.gates import GateReport
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
-from quadriga.agents.predictor.store import Provenance, predictor_sha256, save
+from quadriga.agents.predictor.store import predictor_sha256, save
 from quadriga.commands.parser import main
 from quadriga.recordings.metadata import build_metadata
 from quadriga.replay.outcome import format_outcome
@@ -33,8 +32,6 @@ from quadriga.shared.recording.writer import RecordingWriter
 from tests.a1 import standing
 from tests.plugins.kinds import install_module
 from tests.quadriga.replay.rewritten import rewritten
-
-REPORT = GateReport(1, {}, {}, 0.5, (0.1,), ((1.0,),), (0.3, 2.0), 0.1, 0.5, (), ())
 
 
 def configured(**keys: object) -> Config:
@@ -59,8 +56,7 @@ def fitted(path: Path, config: Config, scale: float = 0.0) -> str:
     """Write a predictor file; its digest."""
     meta = PredictorMeta.of(config)
     G = np.full((1, 1, 1, 6 * meta.N, meta.width), scale)
-    provenance = Provenance("abc", (1,), (900,), (100,), {}, REPORT)
-    return save(path, Predictor(meta, G), provenance)
+    return save(path, Predictor(meta, G))
 
 
 @pytest.fixture

@@ -7,9 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from rich.console import Console
 
-from quadriga.agents.planner.acceptance import load_checked
+from quadriga.agents.predictor.gates import load_checked
+from quadriga.agents.predictor.store import predictor_sha256
 from quadriga.experiments.trial.figures_of_merit import Figures, compute_figures
 from quadriga.experiments.trial.in_process import build_timed_agents, roll_out
 from quadriga.experiments.trial.over_bus import walk_over_bus
@@ -46,7 +46,7 @@ def test_over_the_bus_a_trial_comes_to_the_same(tmp_path: Path) -> None:
         world__push="r2:60:90:0.6:0.2",
     )
     path, run_dir = tmp_path / "predictor.npz", tmp_path / "run"
-    sha256, _ = fit(config, dataset(), path, Console(stderr=True))
+    sha256 = predictor_sha256(fit(config, dataset(), path)[0])
     sent: defaultdict[str, list[bytes]] = defaultdict(list)
 
     def watch(tick: Tick) -> None:
