@@ -15,8 +15,8 @@ import pytest
 TOP: Final = Path(__file__).parents[1]
 WALLS: Final = ("agents", "plant", "shared", "sim_server")
 ROOTS: Final = (*WALLS, "quadriga", "benchmarks")
-# Lines of each package, of Python and of pages, docstrings and blanks included. Lowering one is always
-# right; raising one needs a reason beside it.
+# Lines of each package, of Python and of pages, docstrings and blanks included. Lowering one is
+# always right; raising one needs a reason beside it.
 BUDGETS: Final[Mapping[str, int]] = {
     "agents": 8_000,
     "plant": 1_000,
