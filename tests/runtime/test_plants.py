@@ -108,7 +108,7 @@ def test_a_fall_in_one_world_ends_the_walk_of_all(make_team: Make) -> None:
     fall = next(e for e in events if e.kind == "fall")
     stop = next(e for e in events if e.kind == "stop")
     assert (fall.robot, stop.code, stop.tick) == ("r2", "fallen", fall.tick + 1000)
-    assert stop.detail.endswith("r2")
+    assert stop.detail.startswith("fall of r2;")
     assert [e.kind for e in events].count("start") == 1
 
 
