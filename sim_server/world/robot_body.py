@@ -11,9 +11,9 @@ import numpy as np
 
 from quadriga.shared.config.motors import MotorsConfig
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robots.conventions import FOOT_FRAMES, JOINT_NAMES, Array
+from quadriga.shared.robots.conventions import FOOT_FRAMES, JOINT_NAMES, Array, Leg
 from quadriga.shared.robots.spec import RobotSpec
-from quadriga.sim_server.terrain.relief import LEG_CONTACT, NO_CONTACT, ROBOT_CONTACT
+from quadriga.sim_server.terrain.terrain import LEG_CONTACT, NO_CONTACT, ROBOT_CONTACT
 
 TRUNK: Final = "trunk"  # the trunk's body and box, whatever the URDF calls its link
 VISUAL_GROUP: Final = 1
@@ -46,11 +46,8 @@ class RobotBody:
     def __init__(self, robot: RobotSpec, motors: MotorsConfig, *, leg_collisions: bool) -> None:
         self._robot, self._motors = robot, motors
         self._contact = LEG_CONTACT if leg_collisions else ROBOT_CONTACT
-        self._limb = {
-            "hip": ROBOT_CONTACT if leg_collisions else NO_CONTACT,
-            "thigh": LEG_CONTACT if leg_collisions else NO_CONTACT,
-            "calf": LEG_CONTACT if leg_collisions else NO_CONTACT,
-        }
+        of_limbs = {"hip": ROBOT_CONTACT, "thigh": LEG_CONTACT, "calf": LEG_CONTACT}
+        self._limb = of_limbs if leg_collisions else dict.fromkeys(of_limbs, NO_CONTACT)
         root = robot.urdf_tree()
         self._links = {str(link.get("name")): link for link in root.findall("link")}
         self._joints: dict[str, list[ET.Element]] = {name: [] for name in self._links}
@@ -85,14 +82,13 @@ class RobotBody:
             rgba=rgba,
             mass=0.0,
             priority=1,
-            friction=[friction, 0.005, 0.0001],
+            friction=_sliding(friction),
             **self._contact,
         )
         self._fill(trunk, robot.trunk_link, prefix, friction)
-        for foot in FOOT_FRAMES:
+        for leg in Leg:
             # The hip lies between them, and its range keeps them apart, but a box is no shell.
-            thigh = foot.replace("foot", "thigh")
-            spec.add_exclude(bodyname1=prefix + TRUNK, bodyname2=prefix + thigh)
+            spec.add_exclude(bodyname1=prefix + TRUNK, bodyname2=f"{prefix}{leg.name}_thigh")
         return trunk
 
     def _fill(self, body: mujoco.MjsBody, link: str, prefix: str, friction: float) -> None:
@@ -106,14 +102,12 @@ class RobotBody:
             if kind == "fixed" and not _mass(self._links[name]):
                 continue  # only a frame, which neither MuJoCo nor the controller needs
             pos = _origin(joint)
-            child = body.add_body(name=prefix + name, pos=pos)
-            child.quat = _rotation(joint)
+            child = body.add_body(name=prefix + name, pos=pos, quat=_rotation(joint))
             if kind == "revolute":
                 self._add_joint(child, joint, prefix)
             elif kind != "fixed":
-                raise ConfigError(
-                    "the robot's URDF", f"a joint of type {kind!r}", "fixed or revolute"
-                )
+                got, expected = f"a joint of type {kind!r}", "fixed or revolute"
+                raise ConfigError("the robot's URDF", got, expected)
             self._add_limb(body, link, name, pos, friction)
             self._fill(child, name, prefix, friction)
 
@@ -136,43 +130,45 @@ class RobotBody:
     ) -> None:
         """A capsule from the link's origin to its child's, without mass."""
         leg, _, part = link.partition("_")
-        radius = _LIMB_RADIUS.get(part)
-        if radius is None:
+        if part not in _LIMB_RADIUS:
             return
         # Covers of motors hang on a link as its children too, but the limb leads to the next one.
-        next_one = _NEXT.get(part, "")
-        contact = self._limb[part] if child == f"{leg}_{next_one}" else NO_CONTACT
+        contact = self._limb[part] if child == f"{leg}_{_NEXT[part]}" else NO_CONTACT
         body.add_geom(
             type=mujoco.mjtGeom.mjGEOM_CAPSULE,
             fromto=[0.0, 0.0, 0.0, *end],
-            size=[radius, 0.0, 0.0],
+            size=[_LIMB_RADIUS[part], 0.0, 0.0],
             mass=0.0,
             rgba=_LIMB_RGBA,
             group=VISUAL_GROUP,
             solref=_LIMB_SOLREF,
             priority=1,
-            friction=[friction, 0.005, 0.0001],
+            friction=_sliding(friction),
             **contact,
         )
+
+
+def _sliding(friction: float) -> list[float]:
+    """Sliding friction, with MuJoCo's own of turning and rolling."""
+    return [friction, 0.005, 0.0001]
 
 
 def _add_foot(
     body: mujoco.MjsBody, name: str, radius: float, friction: float, contact: Mapping[str, int]
 ) -> None:
+    sphere = mujoco.mjtGeom.mjGEOM_SPHERE
     body.add_geom(
         name=name,
-        type=mujoco.mjtGeom.mjGEOM_SPHERE,
+        type=sphere,
         size=[radius, 0.0, 0.0],
         mass=0.0,
         rgba=_FOOT_RGBA,
         solref=FOOT_SOLREF,
         priority=1,
-        friction=[friction, 0.005, 0.0001],
+        friction=_sliding(friction),
         **contact,
     )
-    body.add_site(
-        name=name, type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[_TOUCH * radius, 0.0, 0.0], group=4
-    )
+    body.add_site(name=name, type=sphere, size=[_TOUCH * radius, 0.0, 0.0], group=4)
 
 
 def _set_inertia(body: mujoco.MjsBody, link: ET.Element) -> None:
@@ -186,7 +182,7 @@ def _set_inertia(body: mujoco.MjsBody, link: ET.Element) -> None:
     flat = np.empty(9)
     mujoco.mju_quat2Mat(flat, _rotation(inertial))
     R = flat.reshape(3, 3)
-    if not np.array_equal(R, np.eye(3)):
+    if not np.array_equal(R, np.eye(3)):  # else rounding would change it
         turned = R @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ R.T
         body.fullinertia = [*np.diag(turned), turned[0, 1], turned[0, 2], turned[1, 2]]
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -20,8 +20,13 @@ from quadriga.shared.robots.conventions import JOINT_NAMES, N_JOINTS, Array, rob
 _PUSHES, _MOTORS, _LOADS = 3, 4, 5  # streams of the seed: a new push changes no motor
 _PUSH: Final = "'robot:force[N]:direction[deg]:start[s]:duration[s]', commas between pushes"
 _MOTOR: Final = "'robot:joint:start[s]', commas between motors"
-_FORCE_LIMIT: Final = 5000.0  # N; beyond it the world is no longer stable
-_LATEST: Final = 3600.0  # s
+LATEST: Final = 3600.0  # s
+_PUSH_NUMBERS: Final = (  # least and most; beyond 5000 N the world is no longer stable
+    ("force", 0.0, 5000.0),
+    ("direction", -360.0, 360.0),
+    ("start", 0.0, LATEST),
+    ("duration", 1e-3, LATEST),
+)
 _ANY: Final = "any"
 _JOINTS: Final = tuple(name.removesuffix("_joint") for name in JOINT_NAMES)
 
@@ -46,8 +51,7 @@ class Load:
         return f"{self.mass:.6g} kg{where}"
 
 
-@dataclass(frozen=True, slots=True)
-class Push:
+class Push(NamedTuple):
     """A constant horizontal force on the trunk's centre of mass, ticks `start` to `stop` − 1.
 
     Attributes:
@@ -70,8 +74,7 @@ class Push:
         return f"{towards} for {(self.stop - self.start) / 1000:g} s"
 
 
-@dataclass(frozen=True, slots=True)
-class WeakMotor:
+class WeakMotor(NamedTuple):
     """A motor that gives only `share` of its torque from tick `start` on.
 
     Attributes:
@@ -86,46 +89,19 @@ class WeakMotor:
     start: int
     share: float
 
-    @property
-    def detail(self) -> str:
-        """Detail of the event that announces the weakening."""
-        return f"{_JOINTS[self.joint]} gives {100 * self.share:g} % of its torque"
 
+class Scenario(NamedTuple):
+    """The disturbances of a run and its announcements.
 
-@dataclass(frozen=True, slots=True)
-class Scenario:
-    """The disturbances of a run and its announcements, by tick."""
+    Attributes:
+        forces: the pushes on each robot from a tick on, (n, 3), N, world frame.
+        strength: the share of its torque that each motor gives from a tick on, (n, 12).
+        events: that announce them.
+    """
 
-    n: int
-    pushes: tuple[Push, ...]
-    weak: tuple[WeakMotor, ...]
+    forces: Mapping[int, Array]
+    strength: Mapping[int, Array]
     events: tuple[Event, ...]
-
-    def changes(self) -> frozenset[int]:
-        """Ticks at which the pushing forces change."""
-        return frozenset(t for push in self.pushes for t in (push.start, push.stop))
-
-    def forces(self, tick: int) -> Array:
-        """Sum of the pushes on each robot during `tick`. Shape (n, 3), N, world frame."""
-        total = np.zeros((self.n, 3))
-        for push in self.pushes:
-            if push.start <= tick < push.stop:
-                vector = [math.cos(push.direction), math.sin(push.direction), 0.0]
-                total[list(push.robots)] += push.force * np.array(vector)
-        return total
-
-    def weakenings(self) -> frozenset[int]:
-        """Ticks at which a motor weakens."""
-        return frozenset(motor.start for motor in self.weak)
-
-    def strength(self, tick: int) -> Array:
-        """Share of its torque that each motor gives during `tick`. Shape (n, 12)."""
-        strength = np.ones((self.n, N_JOINTS))
-        for motor in self.weak:
-            if motor.start <= tick:
-                place = motor.robot, motor.joint
-                strength[place] = min(strength[place], motor.share)
-        return strength
 
 
 def build_scenario(config: Config, loads: Sequence[Load]) -> Scenario:
@@ -146,15 +122,37 @@ def build_scenario(config: Config, loads: Sequence[Load]) -> Scenario:
     ground += f", seed {world.seed}" if TERRAINS[world.terrain].builder else ""
     events = [Event.of(0, codes.START, "", f"{len(names)} robots, {config.team.yokes} yokes")]
     events.append(Event.of(0, codes.TERRAIN, "", ground))
-    events += [
-        Event.of(0, codes.PAYLOAD, name, load.detail)
-        for name, load in zip(names, loads, strict=True)
-        if load.mass > 0.0
-    ]
-    events += [Event.of(m.start, codes.WEAK_MOTOR, names[m.robot], m.detail) for m in weak]
+    for name, load in zip(names, loads, strict=True):
+        if load.mass > 0.0:
+            events.append(Event.of(0, codes.PAYLOAD, name, load.detail))
+    for robot, joint, start, share in weak:
+        detail = f"{_JOINTS[joint]} gives {100 * share:g} % of its torque"
+        events.append(Event.of(start, codes.WEAK_MOTOR, names[robot], detail))
     for push in sorted(pushes, key=lambda item: item.start):
         events += [Event.of(push.start, codes.PUSH, names[i], push.detail) for i in push.robots]
-    return Scenario(n=len(names), pushes=pushes, weak=weak, events=tuple(events))
+    changes = {tick for push in pushes for tick in (push.start, push.stop)}
+    return Scenario(
+        forces={tick: _forces(pushes, tick, len(names)) for tick in changes},
+        strength={motor.start: _strength(weak, motor.start, len(names)) for motor in weak},
+        events=tuple(events),
+    )
+
+
+def _forces(pushes: Sequence[Push], tick: int, n: int) -> Array:
+    total = np.zeros((n, 3))
+    for push in pushes:
+        if push.start <= tick < push.stop:
+            vector = [math.cos(push.direction), math.sin(push.direction), 0.0]
+            total[list(push.robots)] += push.force * np.array(vector)
+    return total
+
+
+def _strength(weak: Sequence[WeakMotor], tick: int, n: int) -> Array:
+    strength = np.ones((n, N_JOINTS))
+    for robot, joint, start, share in weak:
+        if start <= tick:
+            strength[robot, joint] = min(strength[robot, joint], share)
+    return strength
 
 
 def build_loads(config: Config) -> tuple[Load, ...]:
@@ -210,22 +208,28 @@ def _parse_push(part: str, names: tuple[str, ...]) -> Push:
         raise ConfigError("world.push", repr(part), _PUSH)
     if robot != "all" and robot not in names:
         raise ConfigError("world.push", f"robot {robot!r}", f"'all' or one of {list(names)}")
-    try:
-        force, direction, start, duration = (float(word) for word in numbers)
-    except ValueError:
-        raise ConfigError("world.push", repr(part), _PUSH, "a number is missing") from None
-    for what, value, low, high in (
-        ("force", force, 0.0, _FORCE_LIMIT),
-        ("direction", direction, -360.0, 360.0),
-        ("start", start, 0.0, _LATEST),
-        ("duration", duration, 1e-3, _LATEST),
-    ):
-        if not low <= value <= high:
-            expected = f"a {what} of {low:g} … {high:g}"
-            raise ConfigError("world.push", f"{what} {value:g} in {part!r}", expected)
+    force, direction, start, duration = (
+        read_number("world.push", what, word, part, low, high)
+        for word, (what, low, high) in zip(numbers, _PUSH_NUMBERS, strict=True)
+    )
     first, ms = round(start * 1000), round(duration * 1000)
     robots = tuple(range(len(names))) if robot == "all" else (names.index(robot),)
     return Push(robots, force, math.radians(direction), first, first + ms)
+
+
+def read_number(key: str, what: str, word: str, part: str, least: float, most: float) -> float:
+    """A number of a key's text, which must be one and within its limits.
+
+    Raises:
+        ConfigError: it is not.
+    """
+    try:
+        value = float(word)
+    except ValueError:
+        value = math.nan
+    if not least <= value <= most:  # this way round, it refuses what is not a number, too
+        raise ConfigError(key, f"{what} {word!r} in {part!r}", f"{least:g} … {most:g}")
+    return value
 
 
 def weak_motors(config: Config, random: np.random.Generator) -> tuple[WeakMotor, ...]:
@@ -255,11 +259,6 @@ def _parse_motor(
         expected = f"'any', a part, a leg or {_JOINTS[0]}"
         cause = "parts are hip, thigh, calf; legs are FL, FR, RL, RR"
         raise ConfigError(key, f"joint {fields[1]!r}", expected, cause)
-    try:
-        start = float(fields[2])
-    except ValueError:
-        start = math.nan
-    if not 0.0 <= start <= _LATEST:
-        raise ConfigError(key, f"start {fields[2]!r} in {part!r}", f"0 … {_LATEST:g} s")
+    start = read_number(key, "start", fields[2], part, 0.0, LATEST)
     robot, joint = int(random.choice(robots)), int(random.choice(joints))
     return WeakMotor(robot, joint, round(1000 * start), share)

@@ -20,7 +20,7 @@ from quadriga.shared.config.load import load
 from quadriga.shared.robots.conventions import Array
 from quadriga.shared.robots.registry import ROBOTS
 from quadriga.shared.unitree.packets import SERVO
-from quadriga.sim_server.emulator.board import RobotStatus
+from quadriga.sim_server.emulator.robot_emulator import RobotStatus
 from quadriga.sim_server.world.world import World
 from tests.bridges.robots import holding
 

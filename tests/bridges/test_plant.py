@@ -1,4 +1,4 @@
-"""The plant of one robot, on real sockets, with a board that answers by the millisecond."""
+"""The plant of one robot, on real sockets, with a robot that answers by the millisecond."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from tests.bridges.robots import config_of, real_go1_counts, standing, tilted
 from tests.bridges.test_udp_driver import HOST, free_port
 
 
-class Board:
+class FakeRobot:
     """Sends one and the same posture to whom it has heard, and keeps what it gets."""
 
     def __init__(self, report: RobotReport) -> None:
@@ -66,15 +66,15 @@ class Board:
 
 
 @pytest.fixture
-def board() -> Iterator[Board]:
-    made = Board(standing(config_of(), q=config_of().robot.q_lying))
+def robot() -> Iterator[FakeRobot]:
+    made = FakeRobot(standing(config_of(), q=config_of().robot.q_lying))
     yield made
     made.close()
 
 
 @contextmanager
-def bridge_to(board: Board, said: list[str], *, armed: bool = False) -> Iterator[RobotPlant]:
-    config = load(overrides=board.keys)
+def bridge_to(robot: FakeRobot, said: list[str], *, armed: bool = False) -> Iterator[RobotPlant]:
+    config = load(overrides=robot.keys)
     driver = open_driver("a1", config.bridge)
     watchdog = Watchdog("a1", config.bridge) if armed else None
     plant = RobotPlant(config, "r1", driver, watchdog=watchdog, say=said.append)
@@ -84,18 +84,18 @@ def bridge_to(board: Board, said: list[str], *, armed: bool = False) -> Iterator
         plant.finish()
 
 
-def test_a_dry_run_enables_no_motor_whatever_the_agent_asks_for(board: Board) -> None:
+def test_a_dry_run_enables_no_motor_whatever_the_agent_asks_for(robot: FakeRobot) -> None:
     """Its robot says nothing before it has had a packet: it gets one, and no other."""
     said: list[str] = []
     command = Command(0, 0, *np.full((5, 12), 3.0))
     states = 0
-    with bridge_to(board, said) as plant:
+    with bridge_to(robot, said) as plant:
         assert plant.prepare(lambda: False)
         for _ in range(200):
             states += len(plant.states())
             plant.step({"r1": command})
             sleep(0.001)
-    assert [set(command.mode.tolist()) for command in board.commands] == [{OFF}]
+    assert [set(command.mode.tolist()) for command in robot.commands] == [{OFF}]
     assert plant.mode is BridgeMode.DRY
     assert states > 50
     assert "r1: dry run, no motor is enabled; --armed commands the robot" in said
@@ -117,13 +117,13 @@ def test_a_hot_motor_is_told_of_once_a_minute_and_recorded() -> None:
 def test_a_robot_that_is_not_as_it_must_be_gets_no_command() -> None:
     """This one reports that it lies on its back, and its bridge looks before its team is there."""
     lying = standing(config_of(), quat_wxyz=tilted(3.1), accel=np.array([0.0, 0.0, -9.81]))
-    board = Board(lying)
+    robot = FakeRobot(lying)
     try:
         with pytest.raises(CheckError, match=r"robot r1: posture: got tilted by 3\.10 rad"):
-            build_bridge(load(overrides=board.keys), ("r1",), armed=True)
+            build_bridge(load(overrides=robot.keys), ("r1",), armed=True)
     finally:
-        board.close()
-    assert [set(command.mode.tolist()) for command in board.commands] == [{OFF}]
+        robot.close()
+    assert [set(command.mode.tolist()) for command in robot.commands] == [{OFF}]
 
 
 def test_a_bridge_that_was_silent_learns_at_once_that_its_watchdog_has_acted() -> None:

@@ -16,8 +16,8 @@ from quadriga.shared.config.load import load
 from quadriga.shared.messages import Command
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.unitree.packets import pressed_buttons
-from quadriga.sim_server.emulator.board import Go2Board, RobotStatus
 from quadriga.sim_server.emulator.link import LinkFaults
+from quadriga.sim_server.emulator.robot_emulator import Go2Emulator, RobotStatus
 from quadriga.sim_server.world.world import World
 from tests.bridges.robots import config_of, holding, pressing
 
@@ -29,7 +29,7 @@ class Bench:
     """A robot in a thread of its own, whose ticks go on, and a bridge's driver."""
 
     def __init__(self, domain: int) -> None:
-        self.robot = Go2Board(domain, "lo", seed=(3,))
+        self.robot = Go2Emulator(domain, "lo", seed=(3,))
         self._state = World(load(overrides={"team.robots": 1})).states()["r1"]
         self._over = threading.Event()
         self.command: Command | None = None
@@ -77,7 +77,7 @@ def hasten(patch: pytest.MonkeyPatch) -> None:
     """Have robots and drivers take less time than real ones need."""
     for name in ("bridges.drivers._STILL_S", "bridges.drivers._WATCHED"):
         patch.setattr(f"quadriga.{name}", 0.1)
-    patch.setattr("quadriga.sim_server.emulator.board._MOTION_MS", 10)
+    patch.setattr("quadriga.sim_server.emulator.robot_emulator._MOTION_MS", 10)
 
 
 @pytest.fixture
