@@ -181,9 +181,8 @@ class Fuzz:
         passive = self._supervisor.initial(now, armed=True)
         state = replace(passive, mode=_BEGINNINGS[self._random.integers(len(_BEGINNINGS))])
         request = list(Request)[self._random.integers(len(Request))]
-        return self._supervisor.step(state, SupervisorInputs(now, self._good, 0, request=request))[
-            0
-        ]
+        inputs = SupervisorInputs(now, self._good, 0, request=request)
+        return self._supervisor.step(state, inputs)[0]
 
     def run(self, packets: int) -> None:
         """Send packets.
