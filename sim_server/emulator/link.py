@@ -19,21 +19,13 @@ _MOST_BITS: Final = 8  # that are flipped in a packet
 
 @dataclass(frozen=True, slots=True)
 class LinkFaults:
-    """What a link does to packets.
+    """What a link does to packets, by shares of them, 0 … 1."""
 
-    Attributes:
-        loss: share of packets that do not arrive, 0 … 1.
-        duplicate: share that arrive twice.
-        reorder: share that change places with the next one.
-        garbage: share that arrive with some bits flipped.
-        delay: of each packet, ms.
-    """
-
-    loss: float = 0.0
-    duplicate: float = 0.0
-    reorder: float = 0.0
-    garbage: float = 0.0
-    delay: float = 0.0
+    loss: float = 0.0  # of packets that do not arrive
+    duplicate: float = 0.0  # that arrive twice
+    reorder: float = 0.0  # that change places with the next one
+    garbage: float = 0.0  # that arrive with some bits flipped
+    delay: float = 0.0  # of each packet, ms
 
 
 NO_FAULTS: Final = LinkFaults()
@@ -61,14 +53,9 @@ class Link:
         self._overtaken: list[Parcel] = []  # by the next packet
 
     def pass_on(self, parcels: Sequence[Parcel], now: float) -> Sequence[Parcel]:
-        """Send packets into it, and take those that arrive by now.
+        """Send packets into it now, ms, and take those that arrive by now.
 
-        Args:
-            parcels: that are sent now, in their order.
-            now: ms; never less than at the last call.
-
-        Returns:
-            What arrives; `parcels` themselves where nothing is asked for.
+        Where nothing is asked for it gives the `parcels` themselves.
         """
         if self.faults is NO_FAULTS and not self._way and not self._overtaken:
             return parcels

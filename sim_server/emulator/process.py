@@ -59,12 +59,9 @@ _WORDS: Final = (
 def run(config: Config, *, hung: bool = False, truth: Path | None = None) -> None:
     """Be the robots until SIGINT or SIGTERM. They lie on the ground at first, or hang.
 
-    Args:
-        config: the team's configuration; `bridge.endpoint`, or `bridge.interface`
-            and `bridge.domain`, say where each robot is.
-        hung: whether they hang in the air.
-        truth: gets where they truly are, as CSV every 10 ms: the tick in ms, then `TRUTH_COLUMNS`
-            of each robot, world frame, m, m/s and rad/s; None: nothing does.
+    `bridge.endpoint`, or `bridge.interface` and `bridge.domain`, say where each robot is. The file
+    `truth` gets where they truly are, as CSV every 10 ms: the tick in ms, then `TRUTH_COLUMNS` of
+    each robot, world frame, m, m/s and rad/s.
 
     Raises:
         ConfigError: an address does not parse or is missing, or the file for the truth cannot be

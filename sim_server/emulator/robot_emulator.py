@@ -61,26 +61,17 @@ class RobotStatus:
 
     Its counter counts milliseconds, as those of Unitree's simulators do, from a number that means
     nothing.
-
-    Attributes:
-        first: what its counter says at tick 0.
-        charge: of its battery, %.
-        remote: what its remote control sends, see `remote_bytes`.
-        protected: motors that have switched themselves off, indices in `JOINT_NAMES`.
     """
 
-    first: int = 0
-    charge: float = 80.0
-    remote: bytes = remote_bytes()
-    protected: set[int] = field(default_factory=set)
+    first: int = 0  # what its counter says at tick 0
+    charge: float = 80.0  # of its battery, %
+    remote: bytes = remote_bytes()  # what its remote control sends
+    protected: set[int] = field(default_factory=set)  # joints whose motors are off by themselves
 
     def report(self, state: State, heat: Array, targets: MotorTargets | None) -> RobotReport:
-        """The report of a tick.
+        """The report of a tick, with what its sensors measure and what its motors do.
 
-        Args:
-            state: what its sensors measure.
-            heat: of the motors, (12,), 1 where continuous torque leads.
-            targets: what the motors do; None: they are off.
+        `heat` is that of the motors, (12,), 1 where continuous torque leads; no targets: off.
         """
         mode = np.full(N_JOINTS, OFF, np.uint8) if targets is None else targets.mode.copy()
         mode[list(self.protected)] = PROTECTED
@@ -122,10 +113,6 @@ class RobotEmulator(ABC):
         status: of the robot.
         inwards, outwards: the ways of commands and of reports through its network.
         malformed, received: packets that were no commands, and commands.
-
-    Args:
-        codec: of its packets.
-        seed: of its chance.
     """
 
     period_ms: int
@@ -203,12 +190,7 @@ class RobotEmulator(ABC):
 
 
 class UdpEmulator(RobotEmulator):
-    """An A1 or Go1: it reports to whoever commanded it last, and to nobody before.
-
-    Args:
-        codec: of its packets.
-        here: where it takes commands.
-        seed: of its chance.
+    """An A1 or Go1 at an address: it reports to who commanded it last, and to nobody before.
 
     Raises:
         BridgeError: the port is taken.
@@ -244,11 +226,6 @@ class Go2Emulator(RobotEmulator):
     Attributes:
         lets_go: whether its controller lets go of the motors when it is asked to.
         executed: calls that it has answered, each as often as it came.
-
-    Args:
-        domain: of its network.
-        interface: of this machine.
-        seed: of its chance.
 
     Raises:
         ConfigError: CycloneDDS is not installed.
@@ -326,25 +303,24 @@ def open_emulators(config: Config) -> dict[str, RobotEmulator]:
         ConfigError: an address does not parse or is missing.
         BridgeError: a port is taken, or there is no such interface.
     """
+    team, bridge, opened = config.team, config.bridge, dict[str, RobotEmulator]()
     with ExitStack() as stack:
-        opened = dict[str, RobotEmulator]()
-        for index, name in enumerate(robot_names(config.team.robots)):
-            opened[name] = _open(config, index)
+        for index, name in enumerate(robot_names(team.robots)):
+            seed, number = (config.world.seed, _STREAM, index), str(index + 1)
+            if team.robot == "go2":
+                interface = (bridge.interface or _LOOPBACK).replace("{number}", number)
+                # Robots on one loopback, which real ones are not, have domains of their own.
+                domain = bridge.domain + index * (interface == _LOOPBACK)
+                opened[name] = Go2Emulator(domain, interface, seed)
+            else:
+                text = bridge.endpoint.replace("{number}", number)
+                here = parse_address(text, "bridge.endpoint", Address("", 0))
+                if not here.port:
+                    cause = (
+                        "an emulated robot is not at the address of a real one: deploy/desk.toml"
+                    )
+                    raise ConfigError("bridge.endpoint", "nothing", "HOST:PORT", cause)
+                opened[name] = UdpEmulator(CODECS[team.robot], here, seed)
             stack.callback(opened[name].close)
         stack.pop_all()
     return opened
-
-
-def _open(config: Config, index: int) -> RobotEmulator:
-    kind, bridge, number = config.team.robot, config.bridge, str(index + 1)
-    seed = (config.world.seed, _STREAM, index)
-    if kind == "go2":
-        interface = (bridge.interface or _LOOPBACK).replace("{number}", number)
-        # Robots on one loopback, which real ones are not, have domains of their own.
-        return Go2Emulator(bridge.domain + index * (interface == _LOOPBACK), interface, seed)
-    text = bridge.endpoint.replace("{number}", number)
-    here = parse_address(text, "bridge.endpoint", Address("", 0))
-    if not here.port:
-        cause = "an emulated robot is not at the address of a real one: see deploy/desk.toml"
-        raise ConfigError("bridge.endpoint", "nothing", "HOST:PORT", cause)
-    return UdpEmulator(CODECS[kind], here, seed)

@@ -50,21 +50,13 @@ _BED_LENGTH: Final = 0.15  # m, correlation length of the bed that the stones li
 
 @dataclass(frozen=True, slots=True)
 class BoxTerrain(Terrain):
-    """Upright boxes; where some overlap the highest counts.
+    """Upright boxes; where some overlap the highest counts."""
 
-    Attributes:
-        centre: shape (b, 3), m, world.
-        half: half edge lengths along the box's own axes, shape (b, 3), m.
-        yaw: headings, shape (b,), rad.
-        tall: heights of their tops above the plane, shape (b,), m.
-        colours: RGBA, which the boxes have in turn.
-    """
-
-    centre: Array
-    half: Array
-    yaw: Array
-    tall: Array
-    colours: tuple[tuple[float, ...], ...]
+    centre: Array  # shape (b, 3), m, world
+    half: Array  # half edge lengths along the box's own axes, shape (b, 3), m
+    yaw: Array  # headings, shape (b,), rad
+    tall: Array  # heights of their tops above the plane, shape (b,), m
+    colours: tuple[tuple[float, ...], ...]  # RGBA, which the boxes have in turn
 
     @property
     def top(self) -> float:
@@ -139,15 +131,10 @@ def build_stairs(course: Course, world: WorldConfig, random: np.random.Generator
 
 @dataclass(frozen=True, slots=True)
 class HeightField(Terrain):
-    """Heights over a regular grid, two triangles per cell; the plane z = 0 covers what is lower.
+    """Heights over a regular grid, two triangles per cell; the plane z = 0 covers what is lower."""
 
-    Attributes:
-        extent: the ground covered.
-        z: heights, row r along y and column c along x, shape (rows, columns), m.
-    """
-
-    extent: Rectangle
-    z: Array
+    extent: Rectangle  # the ground covered
+    z: Array  # heights, row r along y and column c along x, shape (rows, columns), m
 
     @property
     def top(self) -> float:

@@ -34,18 +34,12 @@ _NOBODY: Final = -1
 
 @dataclass(frozen=True, slots=True)
 class Pebbles(Terrain):
-    """Stones as they lie before the walk.
-
-    Attributes:
-        pose: centre and attitude wxyz of each stone, shape (s, 7), m, world.
-        size: index of each stone's size in `_SIZES`, shape (s,).
-        half: half axes of the stones of each size, shape (4, 3), m.
-    """
+    """Stones as they lie before the walk."""
 
     loose: ClassVar[bool] = True
-    pose: Array
-    size: NDArray[np.int64]
-    half: Array
+    pose: Array  # centre and attitude wxyz of each stone, shape (s, 7), m, world
+    size: NDArray[np.int64]  # index of each stone's size in `_SIZES`, shape (s,)
+    half: Array  # half axes of the stones of each size, shape (4, 3), m
 
     def add_bodies(self, spec: mujoco.MjSpec, robots: int, friction: float) -> None:
         """Add the bodies of stones that can move, parked, weightless and ordered by size."""

@@ -65,17 +65,11 @@ def add_checker(spec: mujoco.MjSpec, name: str) -> None:
 
 
 class Stones(NamedTuple):
-    """Loose stones as they lay before the walk.
+    """Loose stones as they lay before the walk."""
 
-    Attributes:
-        poses: centre and attitude wxyz of each, shape (k, 7), m, world.
-        halves: half axes of each, shape (k, 3), m.
-        colours: RGB of each, 0 … 1, shape (k, 3).
-    """
-
-    poses: Array
-    halves: Array
-    colours: Array
+    poses: Array  # centre and attitude wxyz of each, shape (k, 7), m, world
+    halves: Array  # half axes of each, shape (k, 3), m
+    colours: Array  # RGB of each, 0 … 1, shape (k, 3)
 
 
 class MovingBodies(Protocol):

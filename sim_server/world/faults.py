@@ -52,22 +52,14 @@ Columns = NDArray[np.intp]
 
 
 class Component(NamedTuple):
-    """A part of a robot that can be faulty.
+    """A part of a robot that can be faulty."""
 
-    Attributes:
-        message: `State` of a sensor, `Command` of a motor.
-        columns: its numbers in the message's row.
-        low, high: between these it draws its numbers when it gives garbage.
-        wrong: from sound numbers to those that it has when it is wrong.
-        unit_length: whether its numbers are an orientation: garbage has unit length.
-    """
-
-    message: type[Flat]
-    columns: Columns
-    low: Array
+    message: type[Flat]  # `State` of a sensor, `Command` of a motor
+    columns: Columns  # its numbers in the message's row
+    low: Array  # between this and `high` it draws its numbers when it gives garbage
     high: Array
-    wrong: Callable[[Array], Array] = np.negative
-    unit_length: bool = False
+    wrong: Callable[[Array], Array] = np.negative  # from sound to wrong numbers
+    unit_length: bool = False  # whether they are an orientation: garbage has unit length
 
 
 def build_components(robot: RobotSpec) -> Mapping[str, tuple[Component, ...]]:
@@ -133,21 +125,13 @@ def _tilt(quat_wxyz: Array) -> Array:
 
 
 class ComponentFault(NamedTuple):
-    """What is wrong with one component of one robot, in ticks `start` to `stop` − 1.
+    """What is wrong with one component of one robot, in ticks `start` to `stop` − 1."""
 
-    Attributes:
-        robot: its name.
-        component: a name of `build_components`.
-        kind: a name of `KINDS`.
-        start: tick, ms.
-        stop: tick, ms; None: it never ends.
-    """
-
-    robot: str
-    component: str
-    kind: str
-    start: int
-    stop: int | None = None
+    robot: str  # its name
+    component: str  # a name of `build_components`
+    kind: str  # a name of `KINDS`
+    start: int  # tick, ms
+    stop: int | None = None  # None: it never ends
 
     @property
     def detail(self) -> str:
@@ -159,11 +143,6 @@ def parse_faults(
     text: str, robots: tuple[str, ...], components: tuple[str, ...]
 ) -> tuple[ComponentFault, ...]:
     """The faults that a text describes, in the order written; empty text means none.
-
-    Args:
-        text: of the grammar above.
-        robots: names of the team's robots.
-        components: names of what can be faulty.
 
     Raises:
         ConfigError: the text does not follow the grammar, or names what there is not.
@@ -226,12 +205,7 @@ class Distortion:
         self._off = False
 
     def distort(self, tick: int, values: Array) -> Array:
-        """The component's numbers at a tick, of the sound ones.
-
-        Args:
-            tick: one more than at the last call.
-            values: sound numbers, in the order of the component's columns.
-        """
+        """The component's numbers at a tick, one more than at the last call, of the sound ones."""
         fault, component = self._fault, self.component
         if tick < fault.start or (fault.stop is not None and tick >= fault.stop):
             self._sound.append(values)
@@ -256,14 +230,10 @@ class Distortion:
 
 
 class Injection:
-    """The faults of `world.faults`, and those added later; without any it costs nothing.
+    """The faults of `world.faults`, and those added later, at the robots `names` of a world.
 
     Attributes:
         events: when each fault of the configuration begins and ends.
-
-    Args:
-        config: the team's configuration.
-        names: of the robots that are in the world, in the order of their rows.
 
     Raises:
         ConfigError: `world.faults` does not parse, or names what there is not.

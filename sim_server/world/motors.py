@@ -45,23 +45,14 @@ _TAU, _Q_DES, _V_DES, _KP, _KD = (
 
 
 class MotorData(NamedTuple):
-    """What motors and joints are like; arrays are by joint, (12,).
+    """What motors and joints are like; arrays are by joint, (12,)."""
 
-    Attributes:
-        curves: torque limits of a cool motor.
-        continuous: torque limit of a hot one, N·m.
-        follow: share of a torque error that is made up for in a tick.
-        friction: dry friction, N·m.
-        viscous: friction by rate, N·m·s/rad.
-        heating: share of a tick in the filter of the temperature; 0: it stays.
-    """
-
-    curves: MotorCurves
-    continuous: Array
-    follow: float
-    friction: float
-    viscous: float
-    heating: float
+    curves: MotorCurves  # torque limits of a cool motor
+    continuous: Array  # torque limit of a hot one, N·m
+    follow: float  # share of a torque error that is made up for in a tick
+    friction: float  # dry friction, N·m
+    viscous: float  # friction by rate, N·m·s/rad
+    heating: float  # share of a tick in the filter of the temperature; 0: it stays
 
 
 class Motors:

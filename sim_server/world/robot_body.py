@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
-from typing import Final
+from typing import Any, Final
 
 import mujoco
 import numpy as np
@@ -72,6 +72,7 @@ class RobotBody:
             rgba: colour of the trunk.
         """
         robot = self._robot
+        surface = {"mass": 0.0, "priority": 1, "friction": [friction, 0.005, 0.0001]}
         trunk = spec.worldbody.add_body(name=prefix + TRUNK, pos=pos)
         trunk.add_freejoint(name=prefix + "free")
         trunk.add_site(name=prefix + "imu", pos=robot.imu, group=4)
@@ -80,22 +81,23 @@ class RobotBody:
             type=mujoco.mjtGeom.mjGEOM_BOX,
             size=[length / 2 for length in robot.trunk_box],
             rgba=rgba,
-            mass=0.0,
-            priority=1,
-            friction=_sliding(friction),
+            **surface,
             **self._contact,
         )
-        self._fill(trunk, robot.trunk_link, prefix, friction)
+        self._fill(trunk, robot.trunk_link, prefix, surface)
         for leg in Leg:
             # The hip lies between them, and its range keeps them apart, but a box is no shell.
             spec.add_exclude(bodyname1=prefix + TRUNK, bodyname2=f"{prefix}{leg.name}_thigh")
         return trunk
 
-    def _fill(self, body: mujoco.MjsBody, link: str, prefix: str, friction: float) -> None:
-        robot = self._robot
+    def _fill(self, body: mujoco.MjsBody, link: str, prefix: str, surface: dict[str, Any]) -> None:
         _set_inertia(body, self._links[link])
         if link in FOOT_FRAMES:
-            _add_foot(body, prefix + link, robot.geometry.foot_radius, friction, self._contact)
+            sphere, radius = mujoco.mjtGeom.mjGEOM_SPHERE, self._robot.geometry.foot_radius
+            foot = {"name": prefix + link, "type": sphere}
+            look = {"rgba": _FOOT_RGBA, "solref": FOOT_SOLREF}
+            body.add_geom(size=[radius, 0.0, 0.0], **foot, **look, **surface, **self._contact)
+            body.add_site(size=[_TOUCH * radius, 0.0, 0.0], group=4, **foot)
         for joint in self._joints[link]:
             name = _child(joint, "child").get("link", "")
             kind = joint.get("type")
@@ -108,8 +110,8 @@ class RobotBody:
             elif kind != "fixed":
                 got, expected = f"a joint of type {kind!r}", "fixed or revolute"
                 raise ConfigError("the robot's URDF", got, expected)
-            self._add_limb(body, link, name, pos, friction)
-            self._fill(child, name, prefix, friction)
+            self._add_limb(body, link, name, pos, surface)
+            self._fill(child, name, prefix, surface)
 
     def _add_joint(self, body: mujoco.MjsBody, joint: ET.Element, prefix: str) -> None:
         name, limit = str(joint.get("name")), _child(joint, "limit")
@@ -126,7 +128,7 @@ class RobotBody:
             added.armature = float(self._robot.rotor_inertias[JOINT_NAMES.index(name)])
 
     def _add_limb(
-        self, body: mujoco.MjsBody, link: str, child: str, end: list[float], friction: float
+        self, body: mujoco.MjsBody, link: str, child: str, end: list[float], surface: dict[str, Any]
     ) -> None:
         """A capsule from the link's origin to its child's, without mass."""
         leg, _, part = link.partition("_")
@@ -134,41 +136,10 @@ class RobotBody:
             return
         # Covers of motors hang on a link as its children too, but the limb leads to the next one.
         contact = self._limb[part] if child == f"{leg}_{_NEXT[part]}" else NO_CONTACT
-        body.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_CAPSULE,
-            fromto=[0.0, 0.0, 0.0, *end],
-            size=[_LIMB_RADIUS[part], 0.0, 0.0],
-            mass=0.0,
-            rgba=_LIMB_RGBA,
-            group=VISUAL_GROUP,
-            solref=_LIMB_SOLREF,
-            priority=1,
-            friction=_sliding(friction),
-            **contact,
-        )
-
-
-def _sliding(friction: float) -> list[float]:
-    """Sliding friction, with MuJoCo's own of turning and rolling."""
-    return [friction, 0.005, 0.0001]
-
-
-def _add_foot(
-    body: mujoco.MjsBody, name: str, radius: float, friction: float, contact: Mapping[str, int]
-) -> None:
-    sphere = mujoco.mjtGeom.mjGEOM_SPHERE
-    body.add_geom(
-        name=name,
-        type=sphere,
-        size=[radius, 0.0, 0.0],
-        mass=0.0,
-        rgba=_FOOT_RGBA,
-        solref=FOOT_SOLREF,
-        priority=1,
-        friction=_sliding(friction),
-        **contact,
-    )
-    body.add_site(name=name, type=sphere, size=[_TOUCH * radius, 0.0, 0.0], group=4)
+        capsule, size = mujoco.mjtGeom.mjGEOM_CAPSULE, [_LIMB_RADIUS[part], 0.0, 0.0]
+        look = {"rgba": _LIMB_RGBA, "group": VISUAL_GROUP, "solref": _LIMB_SOLREF}
+        fromto = [0.0, 0.0, 0.0, *end]
+        body.add_geom(type=capsule, fromto=fromto, size=size, **look, **surface, **contact)
 
 
 def _set_inertia(body: mujoco.MjsBody, link: ET.Element) -> None:

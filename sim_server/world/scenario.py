@@ -33,15 +33,10 @@ _JOINTS: Final = tuple(name.removesuffix("_joint") for name in JOINT_NAMES)
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """A robot's external load.
+    """A robot's external load."""
 
-    Attributes:
-        mass: kg; 0 if there is none.
-        offset: of its centre from the trunk's, along the trunk's x and y, m.
-    """
-
-    mass: float
-    offset: tuple[float, float] = (0.0, 0.0)
+    mass: float  # kg; 0 if there is none
+    offset: tuple[float, float] = (0.0, 0.0)  # of its centre from the trunk's, along its x, y, m
 
     @property
     def detail(self) -> str:
@@ -52,19 +47,12 @@ class Load:
 
 
 class Push(NamedTuple):
-    """A constant horizontal force on the trunk's centre of mass, ticks `start` to `stop` − 1.
+    """A constant horizontal force on the trunk's centre of mass, ticks `start` to `stop` − 1."""
 
-    Attributes:
-        robots: indices of the robots pushed, each with the whole force.
-        force: N.
-        direction: rad, world frame; 0 is along x (forward at the start), π/2 is left.
-        start, stop: ticks, ms.
-    """
-
-    robots: tuple[int, ...]
-    force: float
-    direction: float
-    start: int
+    robots: tuple[int, ...]  # indices of the robots pushed, each with the whole force
+    force: float  # N
+    direction: float  # rad, world frame; 0 is along x (forward at the start), π/2 is left
+    start: int  # tick, ms
     stop: int
 
     @property
@@ -75,41 +63,24 @@ class Push(NamedTuple):
 
 
 class WeakMotor(NamedTuple):
-    """A motor that gives only `share` of its torque from tick `start` on.
+    """A motor that gives only `share` of a sound one's torque from tick `start` on."""
 
-    Attributes:
-        robot: its index.
-        joint: its index in `JOINT_NAMES`.
-        start: tick, ms.
-        share: of the torque that a sound motor would give.
-    """
-
-    robot: int
-    joint: int
-    start: int
+    robot: int  # its index
+    joint: int  # its index in `JOINT_NAMES`
+    start: int  # tick, ms
     share: float
 
 
 class Scenario(NamedTuple):
-    """The disturbances of a run and its announcements.
+    """The disturbances of a run and the events that announce them."""
 
-    Attributes:
-        forces: the pushes on each robot from a tick on, (n, 3), N, world frame.
-        strength: the share of its torque that each motor gives from a tick on, (n, 12).
-        events: that announce them.
-    """
-
-    forces: Mapping[int, Array]
-    strength: Mapping[int, Array]
+    forces: Mapping[int, Array]  # on each robot from a tick on, (n, 3), N, world frame
+    strength: Mapping[int, Array]  # share of torque of each motor from a tick on, (n, 12)
     events: tuple[Event, ...]
 
 
 def build_scenario(config: Config, loads: Sequence[Load]) -> Scenario:
-    """The scenario of a configuration.
-
-    Args:
-        config: the configuration.
-        loads: the load on each robot.
+    """The scenario of a configuration whose robots carry these loads.
 
     Raises:
         ConfigError: `world.push` or `world.weak_motor` does not parse or names an unknown robot.
@@ -199,22 +170,21 @@ def parse_pushes(text: str, names: tuple[str, ...]) -> tuple[Push, ...]:
     Raises:
         ConfigError: the text does not follow the grammar, or names a robot not in `names`.
     """
-    return tuple(_parse_push(part.strip(), names) for part in text.split(",")) if text else ()
-
-
-def _parse_push(part: str, names: tuple[str, ...]) -> Push:
-    robot, *numbers = (word.strip() for word in part.split(":"))
-    if len(numbers) != 4:
-        raise ConfigError("world.push", repr(part), _PUSH)
-    if robot != "all" and robot not in names:
-        raise ConfigError("world.push", f"robot {robot!r}", f"'all' or one of {list(names)}")
-    force, direction, start, duration = (
-        read_number("world.push", what, word, part, low, high)
-        for word, (what, low, high) in zip(numbers, _PUSH_NUMBERS, strict=True)
-    )
-    first, ms = round(start * 1000), round(duration * 1000)
-    robots = tuple(range(len(names))) if robot == "all" else (names.index(robot),)
-    return Push(robots, force, math.radians(direction), first, first + ms)
+    pushes = list[Push]()
+    for part in text.split(",") if text else ():
+        robot, *numbers = (word.strip() for word in part.split(":"))
+        if len(numbers) != 4:
+            raise ConfigError("world.push", repr(part.strip()), _PUSH)
+        if robot != "all" and robot not in names:
+            raise ConfigError("world.push", f"robot {robot!r}", f"'all' or one of {list(names)}")
+        force, direction, start, duration = (
+            read_number("world.push", what, word, part.strip(), low, high)
+            for word, (what, low, high) in zip(numbers, _PUSH_NUMBERS, strict=True)
+        )
+        first, ms = round(start * 1000), round(duration * 1000)
+        robots = tuple(range(len(names))) if robot == "all" else (names.index(robot),)
+        pushes.append(Push(robots, force, math.radians(direction), first, first + ms))
+    return tuple(pushes)
 
 
 def read_number(key: str, what: str, word: str, part: str, least: float, most: float) -> float:
@@ -238,27 +208,22 @@ def weak_motors(config: Config, random: np.random.Generator) -> tuple[WeakMotor,
     Raises:
         ConfigError: the text does not follow the grammar, or names no such robot or joint.
     """
-    text, names = config.world.weak_motor, robot_names(config.team.robots)
-    if not text:
-        return ()
-    share = config.world.weak_share
-    return tuple(_parse_motor(part.strip(), names, share, random) for part in text.split(","))
-
-
-def _parse_motor(
-    part: str, names: tuple[str, ...], share: float, random: np.random.Generator
-) -> WeakMotor:
-    key, fields = "world.weak_motor", [word.strip() for word in part.split(":")]
-    if len(fields) != 3:
-        raise ConfigError(key, repr(part), _MOTOR)
-    robots = [i for i, name in enumerate(names) if fields[0] in (name, _ANY)]
-    joints = [i for i, name in enumerate(_JOINTS) if fields[1] in (name, *name.split("_"), _ANY)]
-    if not robots:
-        raise ConfigError(key, f"robot {fields[0]!r}", f"'any' or one of {', '.join(names)}")
-    if not joints:
-        expected = f"'any', a part, a leg or {_JOINTS[0]}"
-        cause = "parts are hip, thigh, calf; legs are FL, FR, RL, RR"
-        raise ConfigError(key, f"joint {fields[1]!r}", expected, cause)
-    start = read_number(key, "start", fields[2], part, 0.0, LATEST)
-    robot, joint = int(random.choice(robots)), int(random.choice(joints))
-    return WeakMotor(robot, joint, round(1000 * start), share)
+    text, names, key = config.world.weak_motor, robot_names(config.team.robots), "world.weak_motor"
+    weak = list[WeakMotor]()
+    for part in text.split(",") if text else ():
+        fields = [word.strip() for word in part.split(":")]
+        if len(fields) != 3:
+            raise ConfigError(key, repr(part.strip()), _MOTOR)
+        who, which, when = fields
+        robots = [i for i, name in enumerate(names) if who in (name, _ANY)]
+        joints = [i for i, name in enumerate(_JOINTS) if which in (name, *name.split("_"), _ANY)]
+        if not robots:
+            raise ConfigError(key, f"robot {who!r}", f"'any' or one of {', '.join(names)}")
+        if not joints:
+            expected = f"'any', a part, a leg or {_JOINTS[0]}"
+            cause = "parts are hip, thigh, calf; legs are FL, FR, RL, RR"
+            raise ConfigError(key, f"joint {which!r}", expected, cause)
+        start = round(1000 * read_number(key, "start", when, part.strip(), 0.0, LATEST))
+        robot, joint = int(random.choice(robots)), int(random.choice(joints))
+        weak.append(WeakMotor(robot, joint, start, config.world.weak_share))
+    return tuple(weak)

@@ -37,26 +37,16 @@ class TeamModel:
 
     Robot i of this world owns `qpos[19 i : 19 (i + 1)]`, `qvel[18 i : 18 (i + 1)]` and
     `sensordata[22 i : 22 (i + 1)]`, see `layout`; yoke k is tendon k and equality row k.
-
-    Attributes:
-        model: the MuJoCo model.
-        robots: names of this world's robots, and their indices in the team.
-        terrain: the ground, for its height.
-        trunks: body id of each trunk, shape (n,).
-        yokes: the pairs of robot indices that are yoked.
-        rest_length: length of each yoke at the spawn, shape (k,), m.
-        payload: load on each robot of the team.
-        q_spawn: positions at the spawn, shape (19 n,); the terrain's bodies follow.
     """
 
     model: mujoco.MjModel
-    robots: Mapping[str, int]
-    terrain: Terrain
-    trunks: np.ndarray[tuple[int], np.dtype[np.intp]]
-    yokes: tuple[tuple[int, int], ...]
-    rest_length: Array
-    payload: tuple[Load, ...]
-    q_spawn: Array
+    robots: Mapping[str, int]  # names of this world's robots, and their indices in the team
+    terrain: Terrain  # the ground, for its height
+    trunks: np.ndarray[tuple[int], np.dtype[np.intp]]  # body id of each trunk, shape (n,)
+    yokes: tuple[tuple[int, int], ...]  # the pairs of robot indices that are yoked
+    rest_length: Array  # length of each yoke at the spawn, shape (k,), m
+    payload: tuple[Load, ...]  # load on each robot of the team
+    q_spawn: Array  # positions at the spawn, shape (19 n,); the terrain's bodies follow
 
 
 def formation(n: int, spacing: float) -> Array:
