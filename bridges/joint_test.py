@@ -69,7 +69,7 @@ class JointTester:
         self._motion, seconds = state.motion, (self._plant.now - state.since) / 1000.0
         if self._plant.report_at > self._sampled_at:
             self._sampled_at = self._plant.report_at
-            sample = JointSample(seconds, asked.q, state.torque, r.q, r.dq, r.tau, r.gyro)
+            sample = JointSample(np.array(seconds), asked.q, state.torque, r.q, r.dq, r.tau, r.gyro)
             self._samples.append(sample)
         before, self._joint = self._joint, moving_joint(state.motion, seconds)
         if self._joint is not None and self._joint != before:
@@ -108,14 +108,14 @@ class JointSample(NamedTuple):
     All moments of a test are one of these, too, whose arrays have a row for each.
 
     Attributes:
-        seconds: since the test began.
+        seconds: since the test began, ().
         asked: angles, (12,), rad.
         torque_asked: (12,), N·m.
         q, dq, tau: measured, (12,), rad, rad/s, N·m.
         gyro: of the trunk, (3,), rad/s.
     """
 
-    seconds: float
+    seconds: Array
     asked: Array
     torque_asked: Array
     q: Array

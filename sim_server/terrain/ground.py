@@ -114,7 +114,11 @@ def build_stairs(course: Course, world: WorldConfig, random: np.random.Generator
     They lie at the end of the flat place, on the side that the way leads to along x, and begin up
     to a tread's depth later.
     """
-    run, rise, step = world.stairs_run, world.stairs_rise, np.arange(world.stairs_count)
+    run, rise, step = (
+        world.stairs_run,
+        world.stairs_rise,
+        np.arange(world.stairs_count, dtype=float),
+    )
     first = course.flat.x_high + run * random.uniform()
     length = 2.0 * run * (world.stairs_count - 1) + _LANDING
     if course.way[-1, 0] < 0.0:
@@ -125,7 +129,7 @@ def build_stairs(course: Course, world: WorldConfig, random: np.random.Generator
         [(near + far) / 2.0, flat + (right + left) / 2.0, (step + 0.5) * rise], axis=1
     )
     half = np.stack([(far - near) / 2.0, flat + (left - right) / 2.0, flat + rise / 2.0], axis=1)
-    tall: Array = rise * (step + 1.0)
+    tall = rise * (step + 1.0)
     return BoxTerrain(centre, half, flat, tall, _STEP_RGBA)
 
 

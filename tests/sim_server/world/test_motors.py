@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quadriga.shared.config.motors import MotorsConfig
 from quadriga.shared.messages import Command
 from quadriga.shared.robots.a1 import A1
 from quadriga.shared.robots.conventions import N_JOINTS, Array
@@ -19,7 +18,7 @@ from quadriga.shared.robots.registry import ROBOTS
 from quadriga.shared.robots.torque_speed import motor_curves, torque_range
 from quadriga.sim_server.world.motors import Motors
 from quadriga.sim_server.world.world import World
-from tests.sim_server.standing import IDEAL_MOTORS, command, configured, stand
+from tests.sim_server.standing import IDEAL_MOTORS, command, configured
 
 SOUND = np.ones((1, N_JOINTS))
 IDLE = command()
@@ -108,13 +107,6 @@ def test_a_motor_heats_up_to_the_square_of_its_share_of_continuous_torque(share:
         drive(of, command(tau=tau))
     expected = share**2 * (1.0 - math.exp(-700 / 500))
     np.testing.assert_allclose(of.heat, expected, rtol=2e-3)
-
-
-def test_a_standing_robot_with_real_motors_gets_neither_hot_nor_down() -> None:
-    world = World(configured(1, motors=MotorsConfig(heat_time=0.5)))
-    stand(world, 1500)
-    assert not world.fallen()
-    assert world.motors.heat.max() < 0.5
 
 
 def test_a_joint_that_is_thrown_against_its_stop_stays_within_its_range() -> None:
