@@ -30,21 +30,13 @@ _HIP_RADIUS: Final = 0.04  # m, of the motors at hips
 
 
 class Finding(NamedTuple):
-    """What one check came to.
+    """What one check came to."""
 
-    Attributes:
-        name: of the check.
-        got: what was found.
-        expected: what would have been right.
-        ok: whether it is.
-        cause: the likely cause if it is not.
-    """
-
-    name: str
-    got: str
-    expected: str
+    name: str  # of the check
+    got: str  # what was found
+    expected: str  # what would have been right
     ok: bool
-    cause: str = ""
+    cause: str = ""  # the likely cause if it is not
 
 
 def check_reports(

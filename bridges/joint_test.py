@@ -106,44 +106,27 @@ class JointSample(NamedTuple):
     """What was asked of the joints at one moment of the test, and what they reported.
 
     All moments of a test are one of these, too, whose arrays have a row for each.
-
-    Attributes:
-        seconds: since the test began, ().
-        asked: angles, (12,), rad.
-        torque_asked: (12,), N·m.
-        q, dq, tau: measured, (12,), rad, rad/s, N·m.
-        gyro: of the trunk, (3,), rad/s.
     """
 
-    seconds: Array
-    asked: Array
-    torque_asked: Array
-    q: Array
-    dq: Array
-    tau: Array
-    gyro: Array
+    seconds: Array  # since the test began
+    asked: Array  # angles, (12,), rad
+    torque_asked: Array  # (12,), N·m
+    q: Array  # measured, as all that follows, (12,), rad
+    dq: Array  # (12,), rad/s
+    tau: Array  # (12,), N·m
+    gyro: Array  # of the trunk, (3,), rad/s
 
 
 class JointVerdict(NamedTuple):
-    """How one joint moved.
+    """How one joint moved."""
 
-    Attributes:
-        joint: its name.
-        asked: the way to its turning point, rad.
-        moved: the way that it reports, rad.
-        error: the most that it was off its way, rad.
-        torque: the most that it measured, N·m.
-        wrong: what is not right; "" if all is.
-        cause: the likely cause of that.
-    """
-
-    joint: str
-    asked: float
-    moved: float
-    error: float
-    torque: float
-    wrong: str = ""
-    cause: str = ""
+    joint: str  # its name
+    asked: float  # the way to its turning point, rad
+    moved: float  # the way that it reports, rad
+    error: float  # the most that it was off its way, rad
+    torque: float  # the most that it measured, N·m
+    wrong: str = ""  # what is not right; "" if all is
+    cause: str = ""  # the likely cause of that
 
 
 def judge_joints(samples: Sequence[JointSample], motion: Motion) -> list[JointVerdict]:

@@ -51,17 +51,11 @@ class JointLimits(NamedTuple):
 
 
 class Limited(NamedTuple):
-    """A command within the limits.
+    """A command within the limits."""
 
-    Attributes:
-        targets: what may be sent.
-        torque: that the motors will give at the measured angles and rates, (12,), N·m.
-        cut: names of the limits that had to be applied, of `LIMITS`.
-    """
-
-    targets: MotorTargets
-    torque: Array
-    cut: tuple[str, ...]
+    targets: MotorTargets  # what may be sent
+    torque: Array  # that the motors will give at the measured angles and rates, (12,), N·m
+    cut: tuple[str, ...]  # names of the limits that had to be applied, of `LIMITS`
 
 
 def joint_limits(config: BridgeConfig, robot: RobotSpec) -> JointLimits:

@@ -49,16 +49,10 @@ _NOTHING: Final = (-1, 0.0)
 
 
 class RobotPlant(Plant):
-    """See `Plant`. No motor is enabled before `take_charge`, and never unless it is armed.
+    """One robot, at the end of its driver; see `Plant`.
 
-    Args:
-        config: the team's configuration.
-        name: of the robot.
-        driver: the way to it.
-        watchdog: brings the robot to rest when this process dies or hangs; None: a dry run, in
-            which no motor is ever enabled.
-        say: tells the operator what happens.
-        clock: one that never goes back, s.
+    No motor is enabled before `take_charge`, and never in a dry run, without a watchdog: that
+    brings the robot to rest when this process dies or hangs. `say` tells the operator what happens.
 
     Attributes:
         supervision: what the supervisor remembers.
@@ -80,13 +74,12 @@ class RobotPlant(Plant):
         *,
         watchdog: Watchdog | None,
         say: Callable[[str], None],
-        clock: Callable[[], float] = monotonic,
     ) -> None:
         self.names, self.tick = (name,), 0  # ticks begin with the walk
         self._config, self._name, self.period_ms = config, name, driver.period_ms
         self._driver, self._watchdog, self._say = driver, watchdog, say
-        self._clock, self._turned_at = clock, clock()
-        self._idle_rate = Rate(TICK, now=clock, slack=3.0)
+        self._clock, self._turned_at = monotonic, monotonic()
+        self._idle_rate = Rate(TICK, slack=3.0)
         self._supervisor = Supervisor(config.robot, config.bridge, driver.servo)
         self.supervision: SupervisorState = self._supervisor.initial(0, armed=watchdog is not None)
         self.now = 0

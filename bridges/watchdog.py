@@ -37,10 +37,6 @@ _OFF_MS: Final = 500  # of packets that switch the motors off
 class Watchdog:
     """The bridge's end: it starts the watchdog, and tells it all the time that it is alive.
 
-    Args:
-        kind: of robot.
-        config: where it is, and how long it is damped.
-
     Raises:
         BridgeError: the watchdog did not start.
     """

@@ -125,12 +125,8 @@ class LooseStones:
 
     Thousands of free bodies would take longer to simulate than the robots. So the world has a few
     and lends one to every stone near a low foot, until the stone lies still and no foot is near.
-
-    Attributes:
-        pose: of every stone, as of when it last lay still, shape (s, 7), m, world.
-        stone_of: the stone that each body is lent to, −1 for none, shape (p,).
-        without: how often no body was left for a stone near a foot. That foot then passes through
-            the stone, because a stone that appears inside a foot would throw it away.
+    If none is left (`without` counts how often) the foot passes through the stone, because a stone
+    that appears inside a foot would throw it away.
     """
 
     def __init__(
@@ -146,8 +142,8 @@ class LooseStones:
         self._touching = foot_radius + float(stones.half.max())
         self._near = self._touching + _MARGIN
         self._on_top = 2.0 * float(stones.half[:, 2].max()) + foot_radius
-        self.pose = stones.pose.copy()
-        self.stone_of = np.full(count, _NOBODY)
+        self.pose = stones.pose.copy()  # of every stone, as of when it last lay still
+        self.stone_of = np.full(count, _NOBODY)  # the stone that each body is lent to
         self.without = 0
         self._cells: defaultdict[tuple[int, int], set[int]] = defaultdict(set)
         for stone in range(len(self.pose)):

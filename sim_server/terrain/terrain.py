@@ -204,12 +204,7 @@ def _smooth(s: Array) -> Array:
 
 
 def build_course(config: Config, places: Array) -> Course:
-    """The course of a configuration: its reference integrated over the walk, with some margin.
-
-    Args:
-        config: the configuration; `reference` determines the way, `world.duration` its length.
-        places: spawn positions of the trunks, shape (n, 2), m.
-    """
+    """The course of trunks that start at `places`, (n, 2), m: their reference and some margin."""
     low, high = places.min(axis=0) - _HALF_BODY, places.max(axis=0) + _HALF_BODY
     way, backward, turning = _way(config), config.reference.vx < 0.0, config.reference.wz != 0.0
     if config.reference.trace:  # it counts for its first metre: until the flat place is left

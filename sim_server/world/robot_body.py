@@ -34,10 +34,7 @@ class RobotBody:
     Children are added in the order of their joints' names, which is Pinocchio's joint order, so
     joint vectors need no permutation between the two. Links on fixed joints become welded bodies.
 
-    Args:
-        robot: its kind.
-        motors: what its joints are like.
-        leg_collisions: whether its limbs collide, with the ground and with other legs.
+    With `leg_collisions` its limbs touch the ground and other legs.
 
     Raises:
         ConfigError: the URDF is not installed or uses something this parser does not know.
@@ -62,12 +59,12 @@ class RobotBody:
         friction: float,
         rgba: tuple[float, float, float, float],
     ) -> mujoco.MjsBody:
-        """Add one robot on a free joint and return its trunk body.
+        """Add one robot on a free joint, level and with yaw zero; its trunk body.
 
         Args:
             spec: the world under construction.
             prefix: put before every name of the robot, e.g. `r1/`.
-            pos: spawn position of the trunk's origin, world, m; the trunk is level, yaw zero.
+            pos: of the trunk's origin, world, m.
             friction: sliding friction of feet and trunk on the terrain.
             rgba: colour of the trunk.
         """

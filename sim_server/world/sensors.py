@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import accumulate
 from typing import Final
 
 import numpy as np
@@ -29,14 +30,10 @@ _STREAM: Final = 2  # of the seed: the terrain draws from another one
 _ERRORS: Final = 1  # of that stream, for all errors but noise and the IMU's biases
 # Columns of a robot's noise: joints, gyro, accelerometer and feet in the order of the fields of
 # `State`, then the attitude, whose noise is a rotation and is not added.
-_Q = slice(0, N_JOINTS)
-_V = slice(_Q.stop, _Q.stop + N_JOINTS)
-_TAU = slice(_V.stop, _V.stop + N_JOINTS)
-_GYRO = slice(_TAU.stop, _TAU.stop + 3)
-_ACCEL = slice(_GYRO.stop, _GYRO.stop + 3)
-_FOOT = slice(_ACCEL.stop, _ACCEL.stop + N_LEGS)
-_TURN = slice(_FOOT.stop, _FOOT.stop + 3)
-
+_SIZES: Final = (N_JOINTS, N_JOINTS, N_JOINTS, 3, 3, N_LEGS, 3)
+_Q, _V, _TAU, _GYRO, _ACCEL, _FOOT, _TURN = (
+    slice(stop - size, stop) for size, stop in zip(_SIZES, accumulate(_SIZES), strict=True)
+)
 # Places of the fields in a state's row; the joints' three are one behind the other in both.
 _STATE_QUAT, _STATE_GYRO, _STATE_ACCEL, _STATE_FOOT = (
     State.CUTS[name] for name in ("imu_quat_wxyz", "imu_gyro", "imu_accel", "foot_force")
@@ -137,17 +134,9 @@ class Sensors:
         indices = range(n) if indices is None else indices
         self._streams = [np.random.default_rng((seed, _STREAM, i)) for i in indices]
         others = [np.random.default_rng((seed, _STREAM, i, _ERRORS)) for i in indices]
-        self._sigma = np.empty(_TURN.stop)
-        for channel, sigma in (
-            (_Q, config.joint_position),
-            (_V, config.joint_velocity),
-            (_TAU, config.joint_torque),
-            (_GYRO, config.gyro),
-            (_ACCEL, config.accel),
-            (_FOOT, config.foot_force),
-            (_TURN, config.orientation),
-        ):
-            self._sigma[channel] = sigma
+        joints = config.joint_position, config.joint_velocity, config.joint_torque
+        imu_and_feet = config.gyro, config.accel, config.foot_force, config.orientation
+        self._sigma = np.repeat([*joints, *imu_and_feet], _SIZES)
         self._bias, self._yaw_rate = np.zeros((n, _TURN.stop)), np.zeros(n)
         for i, (stream, other) in enumerate(zip(self._streams, others, strict=True)):
             bias = self._bias[i]
@@ -239,13 +228,8 @@ def _convert_foot_forces(
 ) -> None:
     """Make of the noisy normal forces in the states' rows what the sensors say of them.
 
-    Args:
-        kind: what they measure.
-        scale: counts per N, (n, 4).
-        unloaded: counts without load, (n, 4).
-        faults: what each sensor does now, (n, 4).
-        last: what each read last, (n, 4); changed in place.
-        rows: of the states; the feet's forces change.
+    They have `scale` counts per N and some counts `unloaded`; `last`, what each read last, changes
+    in place. All are of shape (n, 4).
     """
     for i in range(len(rows)):
         feet = rows[i, _STATE_FOOT]

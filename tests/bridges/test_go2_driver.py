@@ -1,4 +1,4 @@
-"""The driver of the Go2 against the board of a simulated one, over DDS on the loopback."""
+"""The driver of the Go2 against an emulated one, over DDS on the loopback."""
 
 from __future__ import annotations
 

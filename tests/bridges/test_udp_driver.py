@@ -1,4 +1,4 @@
-"""A driver on real sockets, against the board of a simulated robot and against a noisy network."""
+"""A driver on real sockets, against a robot and against a noisy network."""
 
 from __future__ import annotations
 

@@ -40,10 +40,10 @@ def test_faults_by_name_in_the_order_of_the_table() -> None:
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
 def test_every_fault_is_one_that_the_desk_understands(fault: Any) -> None:
     assert fault.orders or fault.processes
-    board = UdpEmulator(A1, Address(HOST, free_port()))
+    robot = UdpEmulator(A1, Address(HOST, free_port()))
     for order in fault.orders:
-        assert execute(f"r2 {order}", {"r2": board}) == f"r2 {order}"
-    board.close()
+        assert execute(f"r2 {order}", {"r2": robot}) == f"r2 {order}"
+    robot.close()
 
 
 def row(fault: str, seed: int, **fields: Any) -> dict[str, Any]:
