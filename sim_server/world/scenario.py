@@ -19,7 +19,8 @@ from quadriga.shared.robots.conventions import JOINT_NAMES, N_JOINTS, Array, rob
 
 _PUSHES, _MOTORS, _LOADS = 3, 4, 5  # streams of the seed: a new push changes no motor
 _PUSH: Final = "'robot:force[N]:direction[deg]:start[s]:duration[s]', commas between pushes"
-_MOTOR: Final = "'robot:joint:start[s]', commas between motors"
+_MOTOR: Final = "'robot:joint:start[s]' or 'robot:joint:start[s]:share', commas between motors"
+_SHARE: Final = "0.6"  # of its torque that a weak motor gives where none is said
 LATEST: Final = 3600.0  # s
 _PUSH_NUMBERS: Final = (  # least and most; beyond 5000 N the world is no longer stable
     ("force", 0.0, 5000.0),
@@ -28,6 +29,7 @@ _PUSH_NUMBERS: Final = (  # least and most; beyond 5000 N the world is no longer
     ("duration", 1e-3, LATEST),
 )
 _ANY: Final = "any"
+_STRENGTH: Final = "world.motor_strength"
 _JOINTS: Final = tuple(name.removesuffix("_joint") for name in JOINT_NAMES)
 
 
@@ -83,7 +85,7 @@ def build_scenario(config: Config, loads: Sequence[Load]) -> Scenario:
     """The scenario of a configuration whose robots carry these loads.
 
     Raises:
-        ConfigError: `world.push` or `world.weak_motor` does not parse or names an unknown robot.
+        ConfigError: `world.push` or `world.motor_strength` does not parse or names no robot.
     """
     names, world = robot_names(config.team.robots), config.world
     pushes = parse_pushes(world.push, names)
@@ -203,18 +205,18 @@ def read_number(key: str, what: str, word: str, part: str, least: float, most: f
 
 
 def weak_motors(config: Config, random: np.random.Generator) -> tuple[WeakMotor, ...]:
-    """The motors that `world.weak_motor` describes, in the order written.
+    """The motors that `world.motor_strength` describes, in the order written.
 
     Raises:
         ConfigError: the text does not follow the grammar, or names no such robot or joint.
     """
-    text, names, key = config.world.weak_motor, robot_names(config.team.robots), "world.weak_motor"
+    key, text, names = _STRENGTH, config.world.motor_strength, robot_names(config.team.robots)
     weak = list[WeakMotor]()
     for part in text.split(",") if text else ():
         fields = [word.strip() for word in part.split(":")]
-        if len(fields) != 3:
+        if len(fields) not in (3, 4):
             raise ConfigError(key, repr(part.strip()), _MOTOR)
-        who, which, when = fields
+        who, which, when, share = (*fields, _SHARE)[:4]
         robots = [i for i, name in enumerate(names) if who in (name, _ANY)]
         joints = [i for i, name in enumerate(_JOINTS) if which in (name, *name.split("_"), _ANY)]
         if not robots:
@@ -223,7 +225,8 @@ def weak_motors(config: Config, random: np.random.Generator) -> tuple[WeakMotor,
             expected = f"'any', a part, a leg or {_JOINTS[0]}"
             cause = "parts are hip, thigh, calf; legs are FL, FR, RL, RR"
             raise ConfigError(key, f"joint {which!r}", expected, cause)
-        start = round(1000 * read_number(key, "start", when, part.strip(), 0.0, LATEST))
+        start = read_number(key, "start", when, part.strip(), 0.0, LATEST)
+        gives = read_number(key, "share", share, part.strip(), 0.0, 1.0)
         robot, joint = int(random.choice(robots)), int(random.choice(joints))
-        weak.append(WeakMotor(robot, joint, start, config.world.weak_share))
+        weak.append(WeakMotor(robot, joint, round(1000 * start), gives))
     return tuple(weak)

@@ -70,8 +70,7 @@ def test_what_is_drawn_is_announced() -> None:
         payload_on="r1:2,r3",
         payload_scatter=0.05,
         push_force=90.0,
-        weak_motor="r2:FL_calf:1.5",
-        weak_share=0.3,
+        motor_strength="r2:FL_calf:1.5:0.3",
         terrain="slope",
         duration=5.0,
     )
@@ -90,7 +89,7 @@ def test_what_is_drawn_is_announced() -> None:
 
 
 def test_a_motor_is_weak_from_its_tick_on_and_gives_what_is_announced() -> None:
-    scenario = built(2, weak_motor="r2:FR_hip:2,r1:FL_hip:1", weak_share=0.5)
+    scenario = built(2, motor_strength="r2:FR_hip:2:0.5, r1:FL_hip:1:0.5")
     assert scenario.strength.keys() == {1000, 2000}
     assert scenario.strength[1000][0, 0] == scenario.strength[2000][1, 3] == 0.5
     assert scenario.strength[1000].sum() == 23.5
@@ -205,14 +204,14 @@ def test_the_force_sweeps_a_series_without_moving_it() -> None:
 
 
 def weak(text: str, seed: int = 0) -> tuple[WeakMotor, ...]:
-    return weak_motors(configured(3, weak_motor=text), np.random.default_rng(seed))
+    return weak_motors(configured(3, motor_strength=text), np.random.default_rng(seed))
 
 
 def test_motors_are_named_by_robot_and_joint() -> None:
-    first, second = weak("r2:RL_thigh:1.5, r3:FL_hip:0")
+    first, second = weak("r2:RL_thigh:1.5, r3:FL_hip:0:0.25")
     assert (first.robot, JOINT_NAMES[first.joint], first.start) == (1, "RL_thigh_joint", 1500)
     assert (second.robot, JOINT_NAMES[second.joint], second.start) == (2, "FL_hip_joint", 0)
-    assert first.share == 0.6
+    assert (first.share, second.share) == (0.6, 0.25)
     assert weak("") == ()
 
 
@@ -241,8 +240,11 @@ def test_what_is_left_open_is_drawn_from_the_seed(joint: str, among: set[str]) -
         ("r1:calf:-1", "start '-1'"),
         ("r1:calf:nan", "start 'nan'"),
         ("r1:calf:0,", "robot:joint:start"),
+        ("r1:calf:0:0.5:1", "robot:joint:start"),
+        ("r1:calf:0:1.5", "share '1.5'"),
+        ("r1:calf:0:half", "share 'half'"),
     ],
 )
 def test_a_wrong_motor_names_the_key_and_what_is_wrong(text: str, message: str) -> None:
-    with pytest.raises(ConfigError, match=rf"^world\.weak_motor: .*{message}"):
+    with pytest.raises(ConfigError, match=rf"^world\.motor_strength: .*{message}"):
         weak(text)

@@ -136,7 +136,7 @@ def test_motor_law_is_followed_and_limited() -> None:
 
 
 def test_a_weak_motor_gives_its_share_of_the_torque_from_its_time_on() -> None:
-    config = configured(2, weak_motor="r2:RL_calf:0.01", weak_share=0.4)
+    config = configured(2, motor_strength="r2:RL_calf:0.01:0.4")
     world, sound = World(config), World(configured(2))
     asked = command(tau=np.linspace(-40.0, 40.0, N_JOINTS))
     for tick in range(12):
