@@ -9,7 +9,7 @@ MANUAL := $(VENV)/.manual
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 ARGS ?=
 
-.PHONY: install tools walk prepared test test-containers image-lock lint fuzz fuzz-readers drops starts endurance format docs dist pages manual links gallery figures clip acceptance bench bench-against bench-planner bench-recorder
+.PHONY: install tools walk prepared test test-containers image-lock lint fuzz fuzz-readers starts endurance format docs dist pages manual links gallery figures clip acceptance bench bench-against bench-planner bench-recorder
 
 install: $(STAMP)
 
@@ -75,10 +75,6 @@ fuzz: $(TOOLS)
 # memory or ends in anything but an error of the tree fails. ARGS='--only KIND', '--json FILE'.
 fuzz-readers: $(TOOLS)
 	$(BIN)/python -m tests.fuzz $(ARGS)
-
-# Each kind of robot, dropped 50 times from random joint angles: does its bridge get it to stand?
-drops: $(TOOLS)
-	$(BIN)/python -m tests.bridges.dropped $(ARGS)
 
 # 200 walks that are started and stopped at random moments: does any process outlive its walk?
 starts: $(TOOLS)

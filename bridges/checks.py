@@ -30,21 +30,13 @@ _HIP_RADIUS: Final = 0.04  # m, of the motors at hips
 
 
 class Finding(NamedTuple):
-    """What one check came to.
+    """What one check came to."""
 
-    Attributes:
-        name: of the check.
-        got: what was found.
-        expected: what would have been right.
-        ok: whether it is.
-        cause: the likely cause if it is not.
-    """
-
-    name: str
-    got: str
-    expected: str
+    name: str  # of the check
+    got: str  # what was found
+    expected: str  # what would have been right
     ok: bool
-    cause: str = ""
+    cause: str = ""  # the likely cause if it is not
 
 
 def check_reports(
@@ -70,35 +62,24 @@ def check_reports(
         hung: whether it hangs: then its feet may be at any height.
         cause: why fewer came than should, if that is known.
     """
-    wanted, received = 1000.0 * seconds / period_ms, max(received, len(reports))
-    findings = [
-        Finding(
-            "reports",
-            f"{received} in {seconds:g} s",
-            f"at least {config.report_share * wanted:.0f}",
-            received >= config.report_share * wanted,
-            cause or "cable, address, port or interface; is the robot on?",
-        )
-    ]
+    received = max(received, len(reports))
+    wanted = config.report_share * 1000.0 * seconds / period_ms
+    cause = cause or "cable, address, port or interface; is the robot on?"
+    got, expected = f"{received} in {seconds:g} s", f"at least {wanted:.0f}"
+    findings = [Finding("reports", got, expected, received >= wanted, cause)]
     if not reports:
         return findings
     last = reports[-1]
     numbers = np.array([[*r.q, *r.dq, *r.quat_wxyz, *r.gyro, *r.accel] for r in reports])
     finite = bool(np.isfinite(numbers).all())
-    findings.append(
-        Finding("numbers", "all finite" if finite else "not all finite", "all finite", finite)
-    )
+    got = "all finite" if finite else "not all finite"
+    findings.append(Finding("numbers", got, "all finite", finite))
     if not finite:
         return findings
-    findings += [
-        _check_ticks(reports),
-        _check_battery(last, config),
-        *_check_motors(last, config, robot),
-    ]
+    findings += [_check_ticks(reports), _check_battery(last, config)]
+    findings += _check_motors(last, config, robot)
     findings += [_check_angles(reports, robot), *_check_still(reports), *_check_gravity(reports)]
-    if not hung:
-        findings.append(_check_legs(last, robot))
-    return findings
+    return findings if hung else [*findings, _check_legs(last, robot)]
 
 
 def refuse_failed(name: str, findings: Sequence[Finding]) -> None:
@@ -107,11 +88,9 @@ def refuse_failed(name: str, findings: Sequence[Finding]) -> None:
     Raises:
         CheckError: one did.
     """
-    for finding in findings:
-        if not finding.ok:
-            raise CheckError(
-                f"robot {name}: {finding.name}", finding.got, finding.expected, finding.cause
-            )
+    for what, got, expected, ok, cause in findings:
+        if not ok:
+            raise CheckError(f"robot {name}: {what}", got, expected, cause)
 
 
 def _at_most(name: str, got: str, value: float, most: float, unit: str, cause: str) -> Finding:
@@ -119,15 +98,12 @@ def _at_most(name: str, got: str, value: float, most: float, unit: str, cause: s
 
 
 def _check_ticks(reports: Sequence[RobotReport]) -> Finding:
-    ticks = [report.tick for report in reports]
-    rising = len(set(ticks)) > 0.9 * len(ticks)
-    return Finding(
-        "its counter",
-        f"{len(set(ticks))} values in {len(ticks)} reports",
-        "one that goes on",
-        rising,
-        "the robot repeats itself: its controller hangs",
+    count = len({report.tick for report in reports})
+    got, cause = (
+        f"{count} values in {len(reports)} reports",
+        "it repeats itself: its controller hangs",
     )
+    return Finding("its counter", got, "one that goes on", count > 0.9 * len(reports), cause)
 
 
 def _check_battery(report: RobotReport, config: BridgeConfig) -> Finding:
@@ -156,13 +132,9 @@ def _check_angles(reports: Sequence[RobotReport], robot: RobotSpec) -> Finding:
     low, high = np.array(robot.lower) - _BEYOND, np.array(robot.upper) + _BEYOND
     outside = np.flatnonzero(((q < low) | (q > high)).any(axis=0))
     found = ", ".join(f"{JOINT_NAMES[k]} {q[-1, k]:.2f} rad" for k in outside) or "all within"
-    return Finding(
-        "joint angles",
-        found,
-        f"the joints of the {robot.title}",
-        not len(outside),
-        "another kind of robot, or a joint whose zero is wrong: calibrate it",
-    )
+    expected = f"the joints of the {robot.title}"
+    cause = "another kind of robot, or a joint whose zero is wrong: calibrate it"
+    return Finding("joint angles", found, expected, not len(outside), cause)
 
 
 def _check_still(reports: Sequence[RobotReport]) -> list[Finding]:
@@ -185,13 +157,8 @@ def _check_gravity(reports: Sequence[RobotReport]) -> list[Finding]:
     tilt = tilt_of(attitude)
     cosine = float(_up_in_trunk(attitude) @ accel) / max(size, 1e-9)
     off = float(np.arccos(np.clip(cosine, -1.0, 1.0)))
-    normal = Finding(
-        "accelerometer",
-        f"{size:.1f} m/s²",
-        f"{GRAVITY:.1f} ± {_GRAVITY_OFF:g} m/s²",
-        abs(size - GRAVITY) <= _GRAVITY_OFF,
-        "is it being moved?",
-    )
+    ok, expected = abs(size - GRAVITY) <= _GRAVITY_OFF, f"{GRAVITY:.1f} ± {_GRAVITY_OFF:g} m/s²"
+    normal = Finding("accelerometer", f"{size:.1f} m/s²", expected, ok, "is it being moved?")
     lay = "lay it on its feet on level ground"
     vertical = f"{off:.2f} rad off the accelerometer's vertical"
     axes = "the order of the quaternion, or the axes of the IMU"

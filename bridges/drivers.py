@@ -99,12 +99,9 @@ class RobotDriver(ABC):
 
 
 class UdpDriver(RobotDriver):
-    """See `RobotDriver`. Who else sends to the robot cannot be known over UDP.
+    """An A1 or Go1. Who else sends to the robot cannot be known over UDP.
 
-    Args:
-        kind: "a1" or "go1".
-        config: where the robot is, and where its packets arrive.
-        sends_only: whether it only ever sends, from any port.
+    With `sends_only` it only ever sends, from any port.
 
     Raises:
         ConfigError: an address does not parse or resolve.
@@ -161,11 +158,7 @@ class UdpDriver(RobotDriver):
 
 
 class Go2Driver(RobotDriver):
-    """See `RobotDriver`.
-
-    Args:
-        config: interface and domain.
-        sends_only: whether it only ever sends, and has the right to from the start.
+    """A Go2. With `sends_only` it only ever sends, and has the right to from the start.
 
     Raises:
         ConfigError: no interface is given, or CycloneDDS is not installed.
@@ -176,9 +169,8 @@ class Go2Driver(RobotDriver):
 
     def __init__(self, config: BridgeConfig, *, sends_only: bool = False) -> None:
         if not config.interface:
-            raise ConfigError(
-                "bridge.interface", "nothing", "the one the robot hangs on, e.g. eth0"
-            )
+            expected = "the one the robot hangs on, e.g. eth0"
+            raise ConfigError("bridge.interface", "nothing", expected)
         super().__init__(config.period_ms)
         self._participant = DdsParticipant(config.domain, config.interface)
         self._reports = StructReader(self._participant, LOW_STATES)
@@ -186,7 +178,7 @@ class Go2Driver(RobotDriver):
         self._witness = StructReader(self._participant, LOW_COMMANDS, of_others=True)
         self._commands: StructWriter | None = None
         if sends_only:
-            self._open_commands()
+            self._commands = StructWriter(self._participant, LOW_COMMANDS)
         self._switcher = RpcEnd(self._participant, rpc.MOTION_SWITCHER, serves=False)
         self._sport = RpcEnd(self._participant, rpc.SPORT, serves=False)
 
@@ -205,7 +197,7 @@ class Go2Driver(RobotDriver):
         self.counters["sent" if sent else "unsent"] += 1
 
     def other_writers(self) -> int:
-        """How many others have written commands since the last call."""
+        """See `RobotDriver`."""
         return len(self._writers())
 
     def _writers(self) -> set[int]:
@@ -243,14 +235,10 @@ class Go2Driver(RobotDriver):
             sleep(_WATCHED)  # for its last commands
             self.other_writers()
             self._refuse_writers("")
-        self._open_commands()
+        self._commands = StructWriter(self._participant, LOW_COMMANDS)
 
     def _refuse_writers(self, controller: str) -> None:
-        """Look whether anybody writes commands but the robot's own controller, if it has one.
-
-        Raises:
-            BridgeError: somebody does.
-        """
+        """Look whether anybody writes commands but the robot's own controller, if it has one."""
         seen, deadline = set[int](), monotonic() + _WATCHED
         while monotonic() < deadline:
             seen |= self._writers()
@@ -261,11 +249,7 @@ class Go2Driver(RobotDriver):
             raise BridgeError("rt/lowcmd", got, expected, "another bridge, or an app?")
 
     def _lie_down(self, controller: str) -> None:
-        """Have the robot's own controller lie down, and wait until it lies.
-
-        Raises:
-            BridgeError: it does not.
-        """
+        """Have the robot's own controller lie down, and wait until it lies."""
         self._call(self._sport, rpc.STAND_DOWN, {}, _LETTING_GO)
         now = still = monotonic()
         deadline = now + _LETTING_GO
@@ -274,22 +258,16 @@ class Go2Driver(RobotDriver):
             if report is not None and not np.abs(report.dq).max() < _STILL:
                 still = now
             if now > deadline:
-                what = f"the robot's own controller {controller!r}"
-                raise BridgeError(
-                    what, "joints that move", "to lie down", "switch it off in the app"
+                what, cause = (
+                    f"the robot's own controller {controller!r}",
+                    "switch it off in the app",
                 )
+                raise BridgeError(what, "joints that move", "to lie down", cause)
             sleep(_LOOK)
             now = monotonic()
 
-    def _open_commands(self) -> None:
-        self._commands = StructWriter(self._participant, LOW_COMMANDS)
-
     def _await_mode(self, controller: str) -> None:
-        """Wait until this controller is in charge, or none if it is "".
-
-        Raises:
-            BridgeError: another one is.
-        """
+        """Wait until this controller is in charge, or none if it is ""."""
         deadline = monotonic() + _LETTING_GO
         while (name := self._motion_mode()) != controller:
             if monotonic() > deadline:
@@ -299,11 +277,7 @@ class Go2Driver(RobotDriver):
             sleep(_AGAIN)
 
     def _motion_mode(self) -> str:
-        """Name of the controller that is in charge; "" if none is.
-
-        Raises:
-            BridgeError: no answer, or none that can be read.
-        """
+        """Name of the controller that is in charge; "" if none is."""
         answer = self._call(self._switcher, rpc.CHECK_MODE, {}, _ANSWER, is_query=True)
         try:
             return str(json.loads(answer.text)["name"])
@@ -320,13 +294,10 @@ class Go2Driver(RobotDriver):
         *,
         is_query: bool = False,
     ) -> RpcMessage:
-        """The response to a call.
+        """The response to a call; an error if there is none, or a refusal of what is no query.
 
         The robot does what it is asked as often as it is asked. So it is asked once, after it has
         answered a query: it may not have found this side yet. Queries alone are repeated.
-
-        Raises:
-            BridgeError: there is none in time, or it is a refusal of what is no query.
         """
         if not is_query:
             self._call(service, rpc.API_VERSION, {}, _ANSWER, is_query=True)
@@ -354,12 +325,7 @@ class Go2Driver(RobotDriver):
 
 
 def open_driver(kind: str, config: BridgeConfig, *, sends_only: bool = False) -> RobotDriver:
-    """Open it.
-
-    Args:
-        kind: "a1", "go1" or "go2".
-        config: where the robot is.
-        sends_only: whether this is the watchdog's way: it only ever sends.
+    """Open the way to an "a1", "go1" or "go2"; the watchdog's only ever sends.
 
     Raises:
         ConfigError: no interface, or an address that does not parse.

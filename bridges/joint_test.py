@@ -30,14 +30,7 @@ _CALM: Final = 1.0  # rad/s that the trunk may turn
 
 
 class JointTester:
-    """One hanging robot whose joints move, one after the other.
-
-    Args:
-        config: the team's configuration.
-        name: of the robot.
-        driver: the way to it.
-        watchdog: brings the robot to rest when this process dies or hangs.
-    """
+    """One hanging robot whose joints move, one after the other; arguments as of `RobotPlant`."""
 
     def __init__(self, config: Config, name: str, driver: RobotDriver, watchdog: Watchdog) -> None:
         self._name = name
@@ -70,15 +63,14 @@ class JointTester:
 
     def _note(self, supervised: Supervised) -> None:
         """Keep what is asked and measured, and say which joint moves."""
-        state, report, asked = self._plant.supervision, self._plant.report, supervised.targets
-        if state.motion is None or report is None or asked is None:
+        state, r, asked = self._plant.supervision, self._plant.report, supervised.targets
+        if state.motion is None or r is None or asked is None:
             return
         self._motion, seconds = state.motion, (self._plant.now - state.since) / 1000.0
         if self._plant.report_at > self._sampled_at:
-            self._sampled_at, r = self._plant.report_at, report
-            self._samples.append(
-                JointSample(seconds, asked.q, state.torque, r.q, r.dq, r.tau, r.gyro)
-            )
+            self._sampled_at = self._plant.report_at
+            sample = JointSample(np.array(seconds), asked.q, state.torque, r.q, r.dq, r.tau, r.gyro)
+            self._samples.append(sample)
         before, self._joint = self._joint, moving_joint(state.motion, seconds)
         if self._joint is not None and self._joint != before:
             say(f"{self._name}: {JOINT_NAMES[self._joint]} moves")
@@ -113,76 +105,41 @@ def build_joint_tester(config: Config, name: str) -> JointTester:
 class JointSample(NamedTuple):
     """What was asked of the joints at one moment of the test, and what they reported.
 
-    Attributes:
-        seconds: since the test began.
-        asked: angles, (12,), rad.
-        torque_asked: (12,), N·m.
-        q, dq, tau: measured, (12,), rad, rad/s, N·m.
-        gyro: of the trunk, (3,), rad/s.
+    All moments of a test are one of these, too, whose arrays have a row for each.
     """
 
-    seconds: float
-    asked: Array
-    torque_asked: Array
-    q: Array
-    dq: Array
-    tau: Array
-    gyro: Array
+    seconds: Array  # since the test began
+    asked: Array  # angles, (12,), rad
+    torque_asked: Array  # (12,), N·m
+    q: Array  # measured, as all that follows, (12,), rad
+    dq: Array  # (12,), rad/s
+    tau: Array  # (12,), N·m
+    gyro: Array  # of the trunk, (3,), rad/s
 
 
 class JointVerdict(NamedTuple):
-    """How one joint moved.
+    """How one joint moved."""
 
-    Attributes:
-        joint: its name.
-        asked: the way to its turning point, rad.
-        moved: the way that it reports, rad.
-        error: the most that it was off its way, rad.
-        torque: the most that it measured, N·m.
-        wrong: what is not right; "" if all is.
-        cause: the likely cause of that.
-    """
-
-    joint: str
-    asked: float
-    moved: float
-    error: float
-    torque: float
-    wrong: str = ""
-    cause: str = ""
-
-
-class _Log(NamedTuple):
-    seconds: Array
-    asked: Array
-    torque_asked: Array
-    q: Array
-    dq: Array
-    tau: Array
-    gyro: Array
+    joint: str  # its name
+    asked: float  # the way to its turning point, rad
+    moved: float  # the way that it reports, rad
+    error: float  # the most that it was off its way, rad
+    torque: float  # the most that it measured, N·m
+    wrong: str = ""  # what is not right; "" if all is
+    cause: str = ""  # the likely cause of that
 
 
 def judge_joints(samples: Sequence[JointSample], motion: Motion) -> list[JointVerdict]:
-    """The verdicts on all joints whose motion was made to its end.
-
-    Args:
-        samples: of the test, in their order.
-        motion: `joint_motion`, that was asked for.
-    """
+    """The verdicts on all joints whose `joint_motion` was made to its end."""
     if not samples:
         return []
-    log = _Log(*(np.array(column) for column in zip(*samples, strict=True)))
-    verdicts = []
-    for k in range(N_JOINTS):
-        begin, turn, end = motion.ends[3 * k], motion.ends[3 * k + 1], motion.ends[3 * k + 2]
-        if log.seconds[-1] < end:
-            break
-        verdicts.append(_judge(k, log, float(begin), float(turn), float(end)))
-    return verdicts
+    log = JointSample(*(np.array(column) for column in zip(*samples, strict=True)))
+    ends = motion.ends[: 3 * N_JOINTS].reshape(N_JOINTS, 3).tolist()
+    return [_judge(k, log, *ends[k]) for k in range(N_JOINTS) if log.seconds[-1] >= ends[k][2]]
 
 
-def _judge(k: int, log: _Log, begin: float, turn: float, end: float) -> JointVerdict:
-    during = _Log(*(column[(log.seconds >= begin) & (log.seconds < end)] for column in log))
+def _judge(k: int, log: JointSample, begin: float, turn: float, end: float) -> JointVerdict:
+    during = JointSample(*(column[(log.seconds >= begin) & (log.seconds < end)] for column in log))
     before = (log.seconds >= begin - _BEFORE) & (log.seconds < begin)
     turning = np.abs(log.seconds - turn) <= _AROUND
     name = JOINT_NAMES[k]
@@ -201,36 +158,29 @@ def _judge(k: int, log: _Log, begin: float, turn: float, end: float) -> JointVer
     return JointVerdict(name, way, float(moved[k]), error, torque, wrong, cause)
 
 
-def _what_is_wrong(k: int, moved: Array, way: float, during: _Log) -> tuple[str, str]:
+def _what_is_wrong(k: int, moved: Array, way: float, during: JointSample) -> tuple[str, str]:
     """The first thing that is wrong with joint k, and its likely cause; two times "" if none is."""
     share = moved[k] / way
     others = np.abs(moved) / abs(way)
     others[k] = 0.0
     other = int(np.argmax(others))
     if share < _MOVED and others[other] >= _MOVED:
-        return f"{JOINT_NAMES[other]} moved by {moved[other]:+.2f} rad", _order(k, other)
+        order = "order of legs" if k % 3 == other % 3 else "order of joints"
+        return f"{JOINT_NAMES[other]} moved by {moved[other]:+.2f} rad", order
     if share <= -_MOVED:
         return "it moved the other way", "the sign of its angle, or of its command"
     if share < _MOVED:
-        return _why_still(during.torque_asked[:, k], during.tau[:, k])
+        asked, given = (np.max(np.abs(tau[:, k])) for tau in (during.torque_asked, during.tau))
+        if given < 0.5 * asked:
+            return "it did not move", "its motor gives no torque: off, or its cable"
+        return "it did not move", "something holds it, or it is at its end stop"
     if others[other] > _STILL:
         text = f"{JOINT_NAMES[other]} moved too, by {moved[other]:+.2f} rad"
         return text, "it is pushed, or its motor gives no torque"
     return _numbers_of(k, during)
 
 
-def _order(k: int, other: int) -> str:
-    return "order of legs" if k % 3 == other % 3 else "order of joints"
-
-
-def _why_still(asked: Array, measured: Array) -> tuple[str, str]:
-    gives = float(np.max(np.abs(measured)))
-    if gives < 0.5 * float(np.max(np.abs(asked))):
-        return "it did not move", "its motor gives no torque: off, or its cable"
-    return "it did not move", "something holds it, or it is at its end stop"
-
-
-def _numbers_of(k: int, during: _Log) -> tuple[str, str]:
+def _numbers_of(k: int, during: JointSample) -> tuple[str, str]:
     """Whether rate, torque and gyro fit the motion."""
     period = float(during.seconds[-1] - during.seconds[0]) / (len(during.seconds) - 1)
     span = max(1, round(_SPAN / period))
@@ -277,7 +227,7 @@ def refuse_wrong(name: str, verdicts: Sequence[JointVerdict]) -> None:
 def table(verdicts: Sequence[JointVerdict]) -> str:
     """The verdicts in lines: joint, asked, moved, error, torque, verdict."""
     lines = [f"{'joint':<15}{'asked':>8}{'moved':>8}{'error':>8}{'torque':>8}  verdict"]
-    lines[0] += "\n" + f"{'':<15}{'rad':>8}{'rad':>8}{'rad':>8}{'N·m':>8}"
+    lines.append(f"{'':<15}{'rad':>8}{'rad':>8}{'rad':>8}{'N·m':>8}")
     for v in verdicts:
         numbers = f"{v.asked:>+8.2f}{v.moved:>+8.2f}{v.error:>8.2f}{v.torque:>+8.1f}"
         lines.append(f"{v.joint:<15}{numbers}  {v.wrong or 'right'}")

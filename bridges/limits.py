@@ -17,6 +17,7 @@ from quadriga.shared.unitree.packets import MotorTargets
 
 TOO_FAST: Final = 2.0  # times a joint's greatest speed: no joint moves so
 TOO_FAR: Final = 1.0  # rad beyond its range: no joint is there
+# In the order in which they are applied.
 LIMITS: Final = (
     "finite",
     "measured",
@@ -28,7 +29,6 @@ LIMITS: Final = (
     "end-stop",
     "power",
 )
-"""Names of the limits, in the order in which they are applied."""
 _FINITE, _MEASURED, _GAIN, _POSITION, _SPEED, _TORQUE, _RATE, _END_STOP, _POWER = range(len(LIMITS))
 
 
@@ -51,17 +51,11 @@ class JointLimits(NamedTuple):
 
 
 class Limited(NamedTuple):
-    """A command within the limits.
+    """A command within the limits."""
 
-    Attributes:
-        targets: what may be sent.
-        torque: that the motors will give at the measured angles and rates, (12,), N·m.
-        cut: names of the limits that had to be applied, of `LIMITS`.
-    """
-
-    targets: MotorTargets
-    torque: Array
-    cut: tuple[str, ...]
+    targets: MotorTargets  # what may be sent
+    torque: Array  # that the motors will give at the measured angles and rates, (12,), N·m
+    cut: tuple[str, ...]  # names of the limits that had to be applied, of `LIMITS`
 
 
 def joint_limits(config: BridgeConfig, robot: RobotSpec) -> JointLimits:
@@ -83,6 +77,13 @@ def temperature_limits(config: BridgeConfig, robot: RobotSpec) -> Array:
 
 
 @compiled
+def _is_known(k: int, q: Array, dq: Array, limits: JointLimits) -> bool:
+    """Whether a true sensor could say this of joint k."""
+    near = limits.lower[k] - TOO_FAR <= q[k] <= limits.upper[k] + TOO_FAR
+    return bool(near and abs(dq[k]) <= TOO_FAST * limits.speed[k])
+
+
+@compiled
 def shares_of_speed(q: Array, dq: Array, fastest: Array, limits: JointLimits) -> Array:
     """How fast each joint is, (12,): beyond 1 too fast, ∞ if no true sensor could say this of it.
 
@@ -94,9 +95,7 @@ def shares_of_speed(q: Array, dq: Array, fastest: Array, limits: JointLimits) ->
     """
     shares = np.empty(N_JOINTS)
     for k in range(N_JOINTS):
-        near = limits.lower[k] - TOO_FAR <= q[k] <= limits.upper[k] + TOO_FAR
-        known = near and abs(dq[k]) <= TOO_FAST * limits.speed[k]
-        shares[k] = abs(dq[k]) / fastest[k] if known else np.inf
+        shares[k] = abs(dq[k]) / fastest[k] if _is_known(k, q, dq, limits) else np.inf
     return shares
 
 
@@ -144,10 +143,7 @@ def _limit(
         for row in range(5):
             if not math.isfinite(asked[row, k]):
                 asked[row, k], applied[_FINITE] = 0.0, True
-        known = (
-            abs(dq[k]) <= TOO_FAST * limits.speed[k]
-            and limits.lower[k] - TOO_FAR <= q[k] <= limits.upper[k] + TOO_FAR
-        )
+        known = _is_known(k, q, dq, limits)
         at, moving = (q[k], dq[k]) if known else (0.0, 0.0)
         applied[_MEASURED] |= not known
         kp, kd = min(max(asked[3, k], 0.0), MOST_KP), min(max(asked[4, k], 0.0), MOST_KD)

@@ -49,16 +49,10 @@ _NOTHING: Final = (-1, 0.0)
 
 
 class RobotPlant(Plant):
-    """See `Plant`. No motor is enabled before `take_charge`, and never unless it is armed.
+    """One robot, at the end of its driver; see `Plant`.
 
-    Args:
-        config: the team's configuration.
-        name: of the robot.
-        driver: the way to it.
-        watchdog: brings the robot to rest when this process dies or hangs; None: a dry run, in
-            which no motor is ever enabled.
-        say: tells the operator what happens.
-        clock: one that never goes back, s.
+    No motor is enabled before `take_charge`, and never in a dry run, without a watchdog: that
+    brings the robot to rest when this process dies or hangs. `say` tells the operator what happens.
 
     Attributes:
         supervision: what the supervisor remembers.
@@ -80,21 +74,18 @@ class RobotPlant(Plant):
         *,
         watchdog: Watchdog | None,
         say: Callable[[str], None],
-        clock: Callable[[], float] = monotonic,
     ) -> None:
         self.names, self.tick = (name,), 0  # ticks begin with the walk
         self._config, self._name, self.period_ms = config, name, driver.period_ms
         self._driver, self._watchdog, self._say = driver, watchdog, say
-        self._clock, self._turned_at = clock, clock()
-        self._idle_rate = Rate(TICK, now=clock, slack=3.0)
+        self._clock, self._turned_at = monotonic, monotonic()
+        self._idle_rate = Rate(TICK, slack=3.0)
         self._supervisor = Supervisor(config.robot, config.bridge, driver.servo)
         self.supervision: SupervisorState = self._supervisor.initial(0, armed=watchdog is not None)
         self.now = 0
         self.report: RobotReport | None = None
         self.report_at, self._arrived = -1, 0.0  # the same by the clock, s
         self._sent_at, self._warn_at = 0, 0
-        self._foot_refresh = self._foot_changes = 0  # Hz in the busiest second; in this one
-        self._foot_second = clock()
         self._estops: Callable[[], str] = str  # why the team's was pressed, "" if it was not
         self._untold = list[tuple[int, BridgeMode, str]]()  # when a mode began, ms, and why
         self._answers = Histogram(_ANSWER_BIN)  # from reports to the commands made of them, ms
@@ -111,12 +102,7 @@ class RobotPlant(Plant):
         return self.supervision.mode
 
     def look(self, stopped: Callable[[], bool], *, hung: bool = False, tells: bool = True) -> bool:
-        """Check a second of reports; False if `stopped()` came first.
-
-        Args:
-            stopped: asked often whether to stop.
-            hung: whether the robot hangs, and does not lie.
-            tells: whether the operator is told what was found.
+        """Check a second of reports of a robot that lies or hangs; False if `stopped()` is first.
 
         Raises:
             CheckError: the robot is not as it must be.
@@ -139,19 +125,21 @@ class RobotPlant(Plant):
             if stopped():
                 return False
             self._begin_turn()
-            if self._receive():
-                reports += [] if self.report is None else [self.report]
+            if self._receive() and self.report is not None:
+                reports.append(self.report)
             rate.wait()
         malformed = driver.counters["malformed"] - malformed
+        cause = f"{malformed} malformed, the last one {driver.malformed}" if malformed else ""
+        config, received = self._config, driver.counters["received"] - before
         findings = check_reports(
             reports,
             _LOOK_MS / 1000,
             driver.packets_ms,
-            self._config.bridge,
-            self._config.robot,
-            received=driver.counters["received"] - before,
+            config.bridge,
+            config.robot,
+            received=received,
             hung=hung,
-            cause=f"{malformed} malformed, the last one {driver.malformed}" if malformed else "",
+            cause=cause,
         )
         for finding in findings if tells else ():
             self._say(f"{finding.name}: {finding.got}{'' if finding.ok else '  <- not right'}")
@@ -162,7 +150,7 @@ class RobotPlant(Plant):
         """Look at the robot's reports, and get it to stand if it may be commanded.
 
         Raises:
-            CheckError: the robot is not as it must be, or it stopped while it stood up.
+            CheckError: the robot is not as it must be, or does not stand when it should.
             BridgeError: its own controller does not let go of the motors.
         """
         if not self.look(stopped, tells=False):
@@ -171,14 +159,6 @@ class RobotPlant(Plant):
             self._say(f"{self._name}: dry run, no motor is enabled; --armed commands the robot")
             return True
         self.take_charge()
-        return self._stand_up(stopped)
-
-    def _stand_up(self, stopped: Callable[[], bool]) -> bool:
-        """Stand up; False if `stopped()` came first.
-
-        Raises:
-            CheckError: it stopped, or does not stand when it should.
-        """
         before, left = self.mode, self._left_ms
         while self.mode is not BridgeMode.STAND:
             if stopped():
@@ -195,11 +175,7 @@ class RobotPlant(Plant):
         return True
 
     def take_charge(self) -> None:
-        """Have the robot's own controller let go of the motors, and answer for them.
-
-        Raises:
-            BridgeError: it does not let go.
-        """
+        """Have the robot's own controller let go of the motors, or raise; and answer for them."""
         try:
             self._driver.take_over()
         finally:
@@ -251,12 +227,7 @@ class RobotPlant(Plant):
     def turn(self, request: Request, command: Command | None = None) -> Supervised | None:
         """A millisecond: receive, decide, send.
 
-        An agent's new command is sent at once, and some command once in a period at least. In the
-        milliseconds between two commands there is nothing to decide.
-
-        Args:
-            request: what the robot is to do.
-            command: the agent's newest; None before the first, and before the walk.
+        The agent's new `command` is sent at once, and some command once in a period at least.
 
         Returns:
             What was decided; None between two commands, and before the first report.
@@ -301,10 +272,9 @@ class RobotPlant(Plant):
     def _take_arrival(self, tick: int) -> float | None:
         """When the report of a state came, s; None if its command has been sent already."""
         state_tick, arrived = self._arrivals[tick % _REMEMBERED]
-        if state_tick != tick:
-            return None
-        self._arrivals[tick % _REMEMBERED] = _NOTHING
-        return arrived
+        if state_tick == tick:
+            self._arrivals[tick % _REMEMBERED] = _NOTHING
+        return arrived if state_tick == tick else None
 
     def finish(self) -> None:
         """Have the robot lie down, switch its motors off, and leave."""
@@ -338,15 +308,12 @@ class RobotPlant(Plant):
     def describe(self, status: Status) -> Status:
         """With the bridge's mode and reason, and counters of the robot and of its packets.
 
-        `<robot>.answer` of `ages_ms` is the time from the arrival of a report to the command that
-        the agent made of it.
+        `<robot>.answer` of `ages_ms`: from the arrival of a report to the command made of it.
         """
         ages = {**status.ages_ms, **self._answers.quantiles(f"{self._name}.answer")}
         counters = {**status.counters, **self._driver.counters}
         counters |= {f"limited_{name}": count for name, count in self._cut.items()}
-        report = self.report
-        if report is not None:
-            counters["foot_refresh_hz"] = self._foot_refresh
+        if (report := self.report) is not None:
             counters["hottest_c"] = int(np.max(report.temperature))
             counters["motors_lost"] = int(np.sum(report.lost))
             if report.battery is not None:
@@ -365,18 +332,8 @@ class RobotPlant(Plant):
         report = self._driver.receive()
         if report is None:
             return False
-        self._count_foot_changes(report)
         self.report, self.report_at, self._arrived = report, self.now, self._clock()
         return True
-
-    def _count_foot_changes(self, report: RobotReport) -> None:
-        now = self._clock()
-        if now - self._foot_second >= 1.0:
-            rate = round(self._foot_changes / (now - self._foot_second))
-            self._foot_refresh = max(self._foot_refresh, rate)
-            self._foot_second, self._foot_changes = now, 0
-        before = report if self.report is None else self.report
-        self._foot_changes += not np.array_equal(report.foot, before.foot)
 
     def _stall(self) -> int:
         """Milliseconds since this was asked last: more than one if the process stood still."""
@@ -385,14 +342,14 @@ class RobotPlant(Plant):
 
     def _take_changes(self) -> list[Event]:
         """What the bridge has changed since the last call."""
-        changes, self._untold = self._untold, []
-        return [self._event(*change) for change in changes]
-
-    def _event(self, at: int, mode: BridgeMode, reason: str) -> Event:
-        ms_ago, text = self.now - at, f"{mode} {reason}".rstrip()
-        text += f", {ms_ago / 1000:.1f} s before the walk" if ms_ago else ""
-        code = codes.ROBOT_STOPPED if mode is BridgeMode.ESTOP else codes.BRIDGE_MODE
-        return Event.of(self.tick, code, self._name, text)
+        events = []
+        for at, mode, reason in self._untold:
+            ms_ago, text = self.now - at, f"{mode} {reason}".rstrip()
+            text += f", {ms_ago / 1000:.1f} s before the walk" if ms_ago else ""
+            code = codes.ROBOT_STOPPED if mode is BridgeMode.ESTOP else codes.BRIDGE_MODE
+            events.append(Event.of(self.tick, code, self._name, text))
+        self._untold.clear()
+        return events
 
 
 def yaw_of(quat_wxyz: Array) -> float:
@@ -409,18 +366,9 @@ def to_state(report: RobotReport, tick: int, yaw: float) -> State:
     """
     w, x, y, z = report.quat_wxyz
     c, s = math.cos(0.5 * yaw), -math.sin(0.5 * yaw)
-    turned = np.array([c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w])
-    return State(
-        tick,
-        tick * 1_000_000,
-        report.q,
-        report.dq,
-        report.tau,
-        turned,
-        report.gyro,
-        report.accel,
-        report.foot,
-    )
+    quat = np.array([c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w])
+    r = report
+    return State(tick, tick * 1_000_000, r.q, r.dq, r.tau, quat, r.gyro, r.accel, r.foot)
 
 
 def build_bridge(
@@ -430,13 +378,7 @@ def build_bridge(
     armed: bool = False,
     stopped: Callable[[], bool] = bool,
 ) -> RobotPlant:
-    """The plant of a robot behind its bridge, which has looked at it; a `PlantFactory`.
-
-    Args:
-        config: the team's configuration.
-        names: one robot.
-        armed: whether it may be commanded.
-        stopped: asked often whether to look no longer.
+    """The plant of one robot behind its bridge, which has looked at it; a `PlantFactory`.
 
     Raises:
         ConfigError: more than one robot, or no address or interface that can be used.

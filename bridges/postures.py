@@ -84,11 +84,7 @@ def moving_joint(motion: Motion, seconds: float) -> int | None:
 def led_gently(q: Array, dq: Array, mode: int, seconds: float) -> MotorTargets:
     """The command that leads the joints, softly at first: a wrong order or sign shows early.
 
-    Args:
-        q: where to, (12,), rad.
-        dq: likewise, rad/s.
-        mode: in which the motors follow.
-        seconds: since the motors were switched on.
+    `seconds` count from when the motors were switched on.
     """
     return _targets(mode, q, dq, min(1.0, seconds / _BEGIN) * KP, KD)
 

@@ -37,10 +37,6 @@ _OFF_MS: Final = 500  # of packets that switch the motors off
 class Watchdog:
     """The bridge's end: it starts the watchdog, and tells it all the time that it is alive.
 
-    Args:
-        kind: of robot.
-        config: where it is, and how long it is damped.
-
     Raises:
         BridgeError: the watchdog did not start.
     """
@@ -77,14 +73,9 @@ class Watchdog:
 
 
 def watch(driver: RobotDriver, config: BridgeConfig, pipe: int) -> None:
-    """Wait until the bridge says goodbye, or is silent; then bring the robot to rest.
+    """Wait at the pipe until the bridge says goodbye, or is silent; then bring the robot to rest.
 
     Before its first sign of life the bridge is in charge of nothing, and may end as it likes.
-
-    Args:
-        driver: a way to the robot.
-        config: how long a bridge may be silent, and the robot is damped.
-        pipe: from the bridge.
     """
     heard = os.read(pipe, 1)
     if heard != ALIVE:
@@ -96,12 +87,9 @@ def watch(driver: RobotDriver, config: BridgeConfig, pipe: int) -> None:
         if not heard:  # its end is closed: it has died
             break
     os.close(pipe)  # a bridge that is there again learns that its watchdog has acted
-    nowhere = np.zeros(N_JOINTS)
-    rate = Rate(0.001 * driver.period_ms)
-    for targets, ms in (
-        (damped(nowhere, driver.servo), 1000.0 * config.passive_s),
-        (passive(nowhere), _OFF_MS),
-    ):
+    nowhere, rate = np.zeros(N_JOINTS), Rate(0.001 * driver.period_ms)
+    damping, off = damped(nowhere, driver.servo), passive(nowhere)
+    for targets, ms in ((damping, 1000.0 * config.passive_s), (off, _OFF_MS)):
         for _ in range(round(ms / driver.period_ms)):
             driver.send(targets)
             rate.wait()

@@ -28,7 +28,7 @@ from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.robots.colours import robot_rgb
 from quadriga.shared.robots.conventions import Array, robot_names
-from quadriga.sim_server.terrain.relief import Stones
+from quadriga.sim_server.terrain.terrain import Stones
 
 _FORCE_SCALE: Final = 0.005  # m per N
 _FORCE_RADIUS: Final = 0.008  # m
@@ -75,8 +75,8 @@ def frames(poses: Poses, quality: tuple[int, int], meshes: LinkMeshes) -> Iterat
         poses.config, partial(dress, robots=robot_names(poses.config.team.robots), meshes=meshes)
     )
     team.model.vis.quality.shadowsize, team.model.vis.quality.offsamples = quality
-    relief = team.team.terrain.relief
-    if relief.loose:  # thousands of stones
+    terrain = team.team.terrain
+    if terrain.loose:  # thousands of stones
         team.model.vis.quality.numslices, team.model.vis.quality.numstacks = _COARSE
     _light(team.model, 3.0 + 2.0 * poses.radius())
     camera = mujoco.MjvCamera()
@@ -91,7 +91,7 @@ def frames(poses: Poses, quality: tuple[int, int], meshes: LinkMeshes) -> Iterat
             renderer.update_scene(team.physics, camera)
             room = renderer.scene.maxgeom - renderer.scene.ngeom
             centre, reach = poses.centre()[k, :2], poses.radius() + _STREWN
-            add_stones(renderer.scene, relief.stones_near(centre, room, reach))
+            add_stones(renderer.scene, terrain.stones_near(centre, room, reach))
             _add_forces(renderer.scene, team.feet(), poses.grf[k])
             picture = Image.fromarray(renderer.render())
             write_names(picture, team.names, team.trunks(), view)

@@ -11,7 +11,7 @@ import mujoco
 from quadriga.pictures.link_mesh import LinkMesh, LinkMeshes
 from quadriga.shared.robots.colours import robot_rgb
 from quadriga.shared.robots.conventions import FOOT_FRAMES, Leg
-from quadriga.sim_server.terrain.relief import NO_CONTACT
+from quadriga.sim_server.terrain.terrain import NO_CONTACT
 from quadriga.sim_server.world.robot_body import TRUNK, VISUAL_GROUP
 
 HIDDEN_GROUP: Final = 3  # which MuJoCo draws only on demand

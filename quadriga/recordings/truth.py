@@ -13,8 +13,8 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.messages import Truth
 from quadriga.shared.robots.conventions import Array
 from quadriga.shared.robots.spec import RobotSpec
-from quadriga.sim_server.terrain.terrain import Terrain, build_terrain
-from quadriga.sim_server.world.team_model import formation
+from quadriga.sim_server.terrain.terrain import Terrain
+from quadriga.sim_server.world.team_model import build_terrain
 
 Ticks = NDArray[np.int64]
 _FALL_TILT: Final = 1.0  # rad
@@ -74,7 +74,7 @@ def build_truth_trace(messages: Sequence[Truth], config: Config) -> TruthTrace:
     n = config.team.robots
     pos, vel = stack(messages, "base_pos", n, 3), stack(messages, "base_vel", n, 3)
     quat = stack(messages, "base_quat_wxyz", n, 4)
-    terrain = build_terrain(config, formation(n, config.team.spacing))
+    terrain = build_terrain(config)
     y = true_outputs((pos, quat), (vel, stack(messages, "base_omega", n, 3)), terrain, config.robot)
     return TruthTrace(
         tick=ticks_of(messages),

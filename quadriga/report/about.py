@@ -74,8 +74,8 @@ def list_facts(run: ReportedRun) -> Iterator[tuple[str, str]]:
         )
     if world.faults:
         yield "faults", world.faults
-    if world.weak_motor:
-        yield "weak motors", f"{world.weak_motor} at {100 * world.weak_share:g} %"
+    if world.motor_strength:
+        yield "weak motors", world.motor_strength
     asked = config.reference
     speeds = f"vx {asked.vx:g} m/s, vy {asked.vy:g} m/s, wz {asked.wz:g} rad/s"
     rows = asked.trace.count(ROW_END)

@@ -9,9 +9,9 @@ import numpy as np
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.yokes import yoke_pairs
 from quadriga.shared.robots.conventions import Array, robot_names
-from quadriga.sim_server.terrain.terrain import Terrain, build_terrain
+from quadriga.sim_server.terrain.terrain import Terrain
 from quadriga.sim_server.world.scenario import build_loads
-from quadriga.sim_server.world.team_model import formation, spawn_positions
+from quadriga.sim_server.world.team_model import build_terrain, spawn_positions
 from quadriga.view.skeleton import Skeleton
 
 
@@ -64,5 +64,5 @@ def build_team_shape(config: Config) -> TeamShape:
         spawn=spawn,
         yokes=yoke_pairs(n, config.team.yokes),
         loads=(loaded, boxes[list(loaded)]),
-        terrain=build_terrain(config, formation(n, config.team.spacing)),
+        terrain=build_terrain(config),
     )

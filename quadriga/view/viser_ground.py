@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 
 from quadriga.shared.robots.conventions import Array
-from quadriga.sim_server.terrain.relief import Relief
+from quadriga.sim_server.terrain.terrain import Terrain
 from quadriga.view.ground import read_boxes, read_surface
 from quadriga.view.scene_colours import to_linear
 from quadriga.view.team_shape import TeamShape
@@ -46,12 +46,12 @@ def add_ground(scene: Any, shape: TeamShape) -> None:
 class StoneLayer:
     """The loose stones around the team, as they lay before the walk."""
 
-    def __init__(self, scene: Any, relief: Relief) -> None:
+    def __init__(self, scene: Any, terrain: Terrain) -> None:
         """Show those around the place where the team starts, if there are any."""
         from trimesh.creation import icosphere
 
-        self._relief, self._centre = relief, np.zeros(2)
-        stones = relief.stones_near(self._centre, _STONES)
+        self._terrain, self._centre = terrain, np.zeros(2)
+        stones = terrain.stones_near(self._centre, _STONES)
         if not len(stones.poses):
             self._batch = None
             return
@@ -72,7 +72,7 @@ class StoneLayer:
         if self._batch is None or np.linalg.norm(centre - self._centre) < _STRIDE:
             return
         self._centre = centre
-        stones = self._relief.stones_near(centre, _STONES)
+        stones = self._terrain.stones_near(centre, _STONES)
         self._batch.batched_positions = stones.poses[:, :3]
         self._batch.batched_wxyzs = stones.poses[:, 3:]
         self._batch.batched_scales = stones.halves

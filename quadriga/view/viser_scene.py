@@ -49,7 +49,7 @@ class ViewScene:
         self.follows = True
         self._root = scene.add_frame("/team", show_axes=False)
         add_ground(scene, shape)
-        self._stones = StoneLayer(scene, shape.terrain.relief)
+        self._stones = StoneLayer(scene, shape.terrain)
         self._groups: list[tuple[list[int], Any]] = [
             (list(group.links), self._add_group(f"/team/links/{k}", group))
             for k, group in enumerate(group_meshes(meshes, shape.skeleton.links))

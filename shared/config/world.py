@@ -100,14 +100,12 @@ class WorldConfig:
         3.0, "s", "time between two pushes, and before the first", low=0.1, high=600.0
     )
     push_duration: float = key(0.2, "s", "duration of each push of the series", low=1e-3, high=10.0)
-    weak_motor: str = key(
+    motor_strength: str = key(
         "",
         "-",
-        "motors that weaken: 'robot:joint:start[s]' separated by commas; joint as FL_calf, calf or "
-        "FL, either may be 'any', and what is left open is drawn from the seed",
-    )
-    weak_share: float = key(
-        0.6, "1", "share of its torque that a weak motor still gives", low=0.0, high=1.0
+        "motors that weaken: 'robot:joint:start[s]:share' separated by commas; joint as FL_calf, "
+        "calf or FL, either may be 'any', and what is left open is drawn from the seed; share of "
+        "its torque that the motor still gives, 0.6 where none is said",
     )
     faults: str = key(
         "",

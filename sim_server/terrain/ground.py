@@ -13,19 +13,19 @@ from scipy import ndimage
 
 from quadriga.shared.config.world import WorldConfig
 from quadriga.shared.robots.conventions import Array
-from quadriga.sim_server.terrain.relief import (
+from quadriga.sim_server.terrain.terrain import (
     EARTH,
     TERRAIN_CONTACT,
     Course,
     Rectangle,
-    Relief,
+    Terrain,
     add_checker,
 )
 
 _CELL: Final = 0.35  # m, one block per square of this size
 _SIZE: Final = (0.1, 0.4)  # m, range of the horizontal edges
 _LEAST_HEIGHT: Final = 0.2  # of the greatest height
-_AT_ONCE: Final = 64  # positions whose heights are computed together
+_AT_ONCE: Final = 64  # positions: so few that the caches hold what is in between
 _BLOCK_RGBA: Final = ((0.72, 0.53, 0.30, 1.0), (0.80, 0.62, 0.38, 1.0), (0.62, 0.44, 0.24, 1.0))
 _LANDING: Final = 1.5  # m, between the last riser up and the first one down
 _STEP_RGBA: Final = ((0.66, 0.66, 0.64, 1.0), (0.58, 0.58, 0.57, 1.0))  # every second step
@@ -49,152 +49,96 @@ _BED_LENGTH: Final = 0.15  # m, correlation length of the bed that the stones li
 
 
 @dataclass(frozen=True, slots=True)
-class Blocks(Relief):
-    """Blocks on the ground; where two overlap the higher one counts.
+class BoxTerrain(Terrain):
+    """Upright boxes; where some overlap the highest counts."""
 
-    Attributes:
-        centre: horizontal centres, shape (b, 2), m, world.
-        half: half edge lengths along the block's own axes, shape (b, 2), m.
-        yaw: headings, shape (b,), rad.
-        tall: heights above the ground, shape (b,), m.
-    """
-
-    centre: Array
-    half: Array
-    yaw: Array
-    tall: Array
+    centre: Array  # shape (b, 3), m, world
+    half: Array  # half edge lengths along the box's own axes, shape (b, 3), m
+    yaw: Array  # headings, shape (b,), rad
+    tall: Array  # heights of their tops above the plane, shape (b,), m
+    colours: tuple[tuple[float, ...], ...]  # RGBA, which the boxes have in turn
 
     @property
     def top(self) -> float:
-        """Height of the highest block, m."""
+        """Height of the highest box, m."""
         return float(self.tall.max(initial=0.0))
 
     def height(self, x: Array, y: Array) -> Array:
-        """Height of the highest block at each position, or zero. Shape of x, m."""
+        """Height of the highest box at each position, or zero. Shape of x, m."""
         x, y = np.asarray(x), np.asarray(y)
-        height = np.empty(x.size)
+        height, cos, sin = np.empty(x.size), np.cos(self.yaw), np.sin(self.yaw)
         for first in range(0, x.size, _AT_ONCE):
             part = slice(first, first + _AT_ONCE)
-            height[part] = self._heights(x.reshape(-1)[part], y.reshape(-1)[part])
+            dx = x.reshape(-1)[part, None] - self.centre[:, 0]
+            dy = y.reshape(-1)[part, None] - self.centre[:, 1]
+            inside = np.abs(cos * dx + sin * dy) <= self.half[:, 0]
+            inside &= np.abs(cos * dy - sin * dx) <= self.half[:, 1]
+            height[part] = np.where(inside, self.tall, 0.0).max(axis=-1, initial=0.0)
         return height.reshape(x.shape)
 
-    def _heights(self, x: Array, y: Array) -> Array:
-        """The same for so few positions that the processor's caches hold what is in between."""
-        dx = x[:, None] - self.centre[:, 0]
-        dy = y[:, None] - self.centre[:, 1]
-        cos, sin = np.cos(self.yaw), np.sin(self.yaw)
-        inside = np.abs(cos * dx + sin * dy) <= self.half[:, 0]
-        inside &= np.abs(cos * dy - sin * dx) <= self.half[:, 1]
-        height: Array = np.where(inside, self.tall, 0.0).max(axis=-1, initial=0.0)
-        return height
-
     def add_to(self, spec: mujoco.MjSpec) -> None:
-        """Add one box geom per block to the world body."""
-        for i in range(len(self.tall)):
-            h = float(self.tall[i]) / 2.0
+        """Add one box geom each to the world body."""
+        for i, yaw in enumerate(self.yaw):
             spec.worldbody.add_geom(
                 type=mujoco.mjtGeom.mjGEOM_BOX,
-                pos=[*self.centre[i], h],
-                size=[*self.half[i], h],
-                quat=[np.cos(self.yaw[i] / 2.0), 0.0, 0.0, np.sin(self.yaw[i] / 2.0)],
-                rgba=_BLOCK_RGBA[i % len(_BLOCK_RGBA)],
+                pos=self.centre[i],
+                size=self.half[i],
+                quat=[np.cos(yaw / 2.0), 0.0, 0.0, np.sin(yaw / 2.0)],
+                rgba=self.colours[i % len(self.colours)],
                 **TERRAIN_CONTACT,
             )
 
 
-def build_blocks(course: Course, world: WorldConfig, random: np.random.Generator) -> Blocks:
+def build_blocks(course: Course, world: WorldConfig, random: np.random.Generator) -> BoxTerrain:
     """One block per cell of the course that the team's way needs, none on the flat place.
 
-    Args:
-        course: where the team starts and walks.
-        world: how high the highest block may be; heights are uniform in 0.2 … 1 of that.
-        random: the terrain's random stream.
+    Heights are uniform in 0.2 … 1 of `world.terrain_height`.
     """
-    extent = course.extent
-    x, y = np.meshgrid(
-        np.arange(extent.x_low, extent.x_high, _CELL), np.arange(extent.y_low, extent.y_high, _CELL)
-    )
+    (x_low, x_high), (y_low, y_high) = course.extent.sides
+    x, y = np.meshgrid(np.arange(x_low, x_high, _CELL), np.arange(y_low, y_high, _CELL))
     centre = np.stack([x.ravel(), y.ravel()], axis=1)
     centre += random.uniform(0.0, _CELL, centre.shape)
     half = random.uniform(_SIZE[0] / 2.0, _SIZE[1] / 2.0, centre.shape)
     yaw = random.uniform(0.0, np.pi, len(centre))
     tall = world.terrain_height * random.uniform(_LEAST_HEIGHT, 1.0, len(centre))
-    clear = -course.flat.depth(centre[:, 0], centre[:, 1]) > np.hypot(half[:, 0], half[:, 1])
-    keep = clear & course.needs(centre[:, 0], centre[:, 1])
-    return Blocks(centre=centre[keep], half=half[keep], yaw=yaw[keep], tall=tall[keep])
+    keep = -course.flat.depth(*centre.T) > np.hypot(*half.T)
+    keep &= course.needs(*centre.T)
+    up = tall[:, None] / 2.0
+    centre, half = np.hstack([centre, up]), np.hstack([half, up])
+    return BoxTerrain(centre[keep], half[keep], yaw[keep], tall[keep], _BLOCK_RGBA)
 
 
-@dataclass(frozen=True, slots=True)
-class Stairs(Relief):
+def build_stairs(course: Course, world: WorldConfig, random: np.random.Generator) -> BoxTerrain:
     """Boxes on top of each other, each a tread shorter at both ends: their sides are the risers.
 
-    Attributes:
-        risers: where the risers up and down are, shape (count, 2), m along x, world.
-        sides: where the stairs end to the right and to the left, m along y, world.
-        rise: height of a step, m.
+    They lie at the end of the flat place, on the side that the way leads to along x, and begin up
+    to a tread's depth later.
     """
-
-    risers: Array
-    sides: tuple[float, float]
-    rise: float
-
-    @property
-    def top(self) -> float:
-        """Height of the landing, m."""
-        return len(self.risers) * self.rise
-
-    def height(self, x: Array, y: Array) -> Array:
-        """Height of the treads, or zero, at positions of any equal shape, m."""
-        beyond = np.asarray(x)[..., None]
-        steps = ((beyond >= self.risers[:, 0]) & (beyond <= self.risers[:, 1])).sum(axis=-1)
-        beside = (np.asarray(y) < self.sides[0]) | (np.asarray(y) > self.sides[1])
-        return np.where(beside, 0.0, self.rise * steps)
-
-    def add_to(self, spec: mujoco.MjSpec) -> None:
-        """Add one box geom per step to the world body."""
-        right, left = self.sides
-        for i, (near, far) in enumerate(self.risers.tolist()):
-            spec.worldbody.add_geom(
-                type=mujoco.mjtGeom.mjGEOM_BOX,
-                pos=[(near + far) / 2.0, (right + left) / 2.0, (i + 0.5) * self.rise],
-                size=[(far - near) / 2.0, (left - right) / 2.0, self.rise / 2.0],
-                rgba=_STEP_RGBA[i % len(_STEP_RGBA)],
-                **TERRAIN_CONTACT,
-            )
-
-
-def build_stairs(course: Course, world: WorldConfig, random: np.random.Generator) -> Stairs:
-    """Stairs at the end of the flat place, on the side that the way leads to along x.
-
-    Args:
-        course: where the team starts and walks.
-        world: how high, deep and many the steps are.
-        random: the terrain's random stream; up to a tread's depth the stairs begin later.
-    """
-    run, count = world.stairs_run, world.stairs_count
+    run, rise, step = (
+        world.stairs_run,
+        world.stairs_rise,
+        np.arange(world.stairs_count, dtype=float),
+    )
     first = course.flat.x_high + run * random.uniform()
-    length = 2.0 * run * (count - 1) + _LANDING
+    length = 2.0 * run * (world.stairs_count - 1) + _LANDING
     if course.way[-1, 0] < 0.0:
         first = course.flat.x_low - (first - course.flat.x_high) - length
-    near = first + run * np.arange(count)
-    return Stairs(
-        risers=np.stack([near, 2.0 * first + length - near], axis=1),
-        sides=course.extent.sides[1],
-        rise=world.stairs_rise,
+    near, (right, left) = first + run * step, course.extent.sides[1]
+    far, flat = 2.0 * first + length - near, np.zeros(step.shape)
+    centre = np.stack(
+        [(near + far) / 2.0, flat + (right + left) / 2.0, (step + 0.5) * rise], axis=1
     )
+    half = np.stack([(far - near) / 2.0, flat + (left - right) / 2.0, flat + rise / 2.0], axis=1)
+    tall = rise * (step + 1.0)
+    return BoxTerrain(centre, half, flat, tall, _STEP_RGBA)
 
 
 @dataclass(frozen=True, slots=True)
-class HeightField(Relief):
-    """Heights over a regular grid, two triangles per cell; the plane z = 0 covers what is lower.
+class HeightField(Terrain):
+    """Heights over a regular grid, two triangles per cell; the plane z = 0 covers what is lower."""
 
-    Attributes:
-        extent: the ground covered.
-        z: heights, row r along y and column c along x, shape (rows, columns), m.
-    """
-
-    extent: Rectangle
-    z: Array
+    extent: Rectangle  # the ground covered
+    z: Array  # heights, row r along y and column c along x, shape (rows, columns), m
 
     @property
     def top(self) -> float:
@@ -203,8 +147,7 @@ class HeightField(Relief):
 
     def height(self, x: Array, y: Array) -> Array:
         """Height of the surface that feet touch, at positions of any equal shape, m."""
-        rows, columns = self.z.shape
-        box = self.extent
+        (rows, columns), box = self.z.shape, self.extent
         c = (np.asarray(x) - box.x_low) / (box.x_high - box.x_low) * (columns - 1)
         r = (np.asarray(y) - box.y_low) / (box.y_high - box.y_low) * (rows - 1)
         inside = (c >= 0.0) & (c <= columns - 1) & (r >= 0.0) & (r <= rows - 1)
@@ -222,22 +165,16 @@ class HeightField(Relief):
     def add_to(self, spec: mujoco.MjSpec) -> None:
         """Add the field as one geom of the world body."""
         add_checker(spec, EARTH)
-        rows, columns = self.z.shape
-        box = self.extent
-        half_x, half_y = (box.x_high - box.x_low) / 2.0, (box.y_high - box.y_low) / 2.0
-        low, high = float(self.z.min()), float(self.z.max())
-        spec.add_hfield(
-            name="terrain",
-            nrow=rows,
-            ncol=columns,
-            userdata=self.z.ravel(),
-            size=[half_x, half_y, high - low, _BASE],
-        )
+        (x_low, x_high), (y_low, y_high) = self.extent.sides
+        half_x, half_y = (x_high - x_low) / 2.0, (y_high - y_low) / 2.0
+        (rows, columns), low = self.z.shape, float(self.z.min())
+        size = [half_x, half_y, float(self.z.max()) - low, _BASE]
+        spec.add_hfield(name="terrain", nrow=rows, ncol=columns, userdata=self.z.ravel(), size=size)
         spec.worldbody.add_geom(
             name="terrain",
             type=mujoco.mjtGeom.mjGEOM_HFIELD,
             hfieldname="terrain",
-            pos=[box.x_low + half_x, box.y_low + half_y, low],
+            pos=[x_low + half_x, y_low + half_y, low],
             material=EARTH,
             **TERRAIN_CONTACT,
         )
@@ -266,13 +203,9 @@ def build_gravel(course: Course, world: WorldConfig, random: np.random.Generator
 
 
 def build_ramps(course: Course, world: WorldConfig, random: np.random.Generator) -> HeightField:
-    """Ramps that lead up and down again, one after the other, as wide as the ground.
+    """Ramps of `world.slope` up and down again, one after the other, as wide as the ground.
 
-    Args:
-        course: where the team starts and walks.
-        world: how steep every ramp and how high the highest crest is; the others are drawn, down to
-            half of that.
-        random: the terrain's random stream.
+    Crests are uniform in 0.5 … 1 of `world.terrain_height`.
     """
     x, y = _grid(course.extent, _RAMP_CELL)
     heading = random.uniform(-_RAMP_TURN, _RAMP_TURN)
@@ -323,12 +256,9 @@ def _hills(shape: tuple[int, ...], length: float, random: np.random.Generator) -
 
 def _grid(extent: Rectangle, cell: float) -> tuple[Array, Array]:
     """Positions of grid points at most `cell` apart, two arrays of shape (rows, columns), m."""
-    columns = int(np.ceil((extent.x_high - extent.x_low) / cell)) + 1
-    rows = int(np.ceil((extent.y_high - extent.y_low) / cell)) + 1
-    x, y = np.meshgrid(
-        np.linspace(extent.x_low, extent.x_high, columns),
-        np.linspace(extent.y_low, extent.y_high, rows),
-    )
+    counts = (int(np.ceil((high - low) / cell)) + 1 for low, high in extent.sides)
+    lines = (np.linspace(*ends, n) for ends, n in zip(extent.sides, counts, strict=True))
+    x, y = np.meshgrid(*lines)
     return x, y
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from quadriga.shared.config.world import WorldConfig
 from quadriga.shared.robots.conventions import N_LEGS, Array
-from quadriga.sim_server.terrain.relief import STONE_CONTACT, Course, Rectangle, Relief, Stones
+from quadriga.sim_server.terrain.terrain import STONE_CONTACT, Course, Rectangle, Stones, Terrain
 
 _SIZES: Final = (0.5, 0.67, 0.83, 1.0)  # of the largest
 _AXES: Final = (1.3, 1.1, 1.0)  # half axes of a stone over half its height
@@ -33,39 +33,21 @@ _NOBODY: Final = -1
 
 
 @dataclass(frozen=True, slots=True)
-class Pebbles(Relief):
-    """Stones as they lie before the walk.
-
-    Attributes:
-        pose: centre and attitude wxyz of each stone, shape (s, 7), m, world.
-        size: index of each stone's size in `_SIZES`, shape (s,).
-        half: half axes of the stones of each size, shape (4, 3), m.
-    """
+class Pebbles(Terrain):
+    """Stones as they lie before the walk."""
 
     loose: ClassVar[bool] = True
-    pose: Array
-    size: NDArray[np.int64]
-    half: Array
-
-    @property
-    def reach(self) -> float:
-        """Greatest half axis of the largest stones, m."""
-        return float(self.half.max())
-
-    def parking_poses(self, robots: int) -> Array:
-        """Poses of the unused bodies of stones, ordered by size, m, world. Shape (p, 7)."""
-        count = len(_SIZES) * -(-_PER_LEG * N_LEGS * robots // len(_SIZES))
-        parked = np.zeros((count, 7))
-        parked[:, 0] = 4.0 * self.reach * np.arange(count)
-        parked[:, 2], parked[:, 3] = _PARKED, 1.0
-        return parked
+    pose: Array  # centre and attitude wxyz of each stone, shape (s, 7), m, world
+    size: NDArray[np.int64]  # index of each stone's size in `_SIZES`, shape (s,)
+    half: Array  # half axes of the stones of each size, shape (4, 3), m
 
     def add_bodies(self, spec: mujoco.MjSpec, robots: int, friction: float) -> None:
-        """Add the bodies of stones that can move, parked and weightless, after everything else."""
-        parked = self.parking_poses(robots)
-        for k, pose in enumerate(parked.tolist()):
-            i = k * len(_SIZES) // len(parked)
-            body = spec.worldbody.add_body(name=f"pebble{k}", pos=pose[:3], gravcomp=1.0)
+        """Add the bodies of stones that can move, parked, weightless and ordered by size."""
+        apart = 4.0 * float(self.half.max())
+        for k in range(count := _bodies(robots)):
+            i = k * len(_SIZES) // count
+            pos = [apart * k, 0.0, _PARKED]
+            body = spec.worldbody.add_body(name=f"pebble{k}", pos=pos, gravcomp=1.0)
             body.add_freejoint()
             body.add_geom(
                 type=mujoco.mjtGeom.mjGEOM_ELLIPSOID,
@@ -82,7 +64,7 @@ class Pebbles(Relief):
 
     def start(self, model: Any, physics: Any, robots: int, foot_radius: float) -> LooseStones:
         """Lend the bodies of a compiled world to stones near feet."""
-        return LooseStones(self, self.parking_poses(robots), model, physics, foot_radius)
+        return LooseStones(self, _bodies(robots), model, physics, foot_radius)
 
     def stones_near(self, centre: Array, most: int, reach: float = np.inf) -> Stones:
         """The stones around a place, the nearest first."""
@@ -95,13 +77,15 @@ class Pebbles(Relief):
         return Stones(self.pose[nearest], self.half[self.size[nearest]], colours)
 
 
+def _bodies(robots: int) -> int:
+    """How many stones can move, as many of each size."""
+    return len(_SIZES) * -(-_PER_LEG * N_LEGS * robots // len(_SIZES))
+
+
 def build_pebbles(course: Course, world: WorldConfig, random: np.random.Generator) -> Pebbles:
     """Stones side by side wherever the team's way needs them, none on the flat place.
 
-    Args:
-        course: where the team starts and walks.
-        world: how high the largest stones are.
-        random: the terrain's random stream.
+    The largest are `world.terrain_height` high.
     """
     half = 0.5 * world.terrain_height * np.outer(_SIZES, _AXES)
     longest = float(half.max())
@@ -113,8 +97,7 @@ def build_pebbles(course: Course, world: WorldConfig, random: np.random.Generato
     away *= free + longest - half[size, 0]
     centre += np.stack([away * np.cos(turn), away * np.sin(turn)], axis=1)
     yaw = random.uniform(0.0, np.pi, len(centre))
-    keep = -course.flat.depth(centre[:, 0], centre[:, 1]) > longest
-    keep &= course.needs(centre[:, 0], centre[:, 1])
+    keep = (-course.flat.depth(*centre.T) > longest) & course.needs(*centre.T)
     pose = np.zeros((len(centre), 7))
     pose[:, :2], pose[:, 2] = centre, half[size, 2]
     pose[:, 3], pose[:, 6] = np.cos(yaw / 2.0), np.sin(yaw / 2.0)
@@ -142,28 +125,15 @@ class LooseStones:
 
     Thousands of free bodies would take longer to simulate than the robots. So the world has a few
     and lends one to every stone near a low foot, until the stone lies still and no foot is near.
-
-    Attributes:
-        pose: of every stone, as of when it last lay still, shape (s, 7), m, world.
-        stone_of: the stone that each body is lent to, −1 for none, shape (p,).
-        without: how often no body was left for a stone near a foot. That foot then passes through
-            the stone, because a stone that appears inside a foot would throw it away.
+    If none is left (`without` counts how often) the foot passes through the stone, because a stone
+    that appears inside a foot would throw it away.
     """
 
     def __init__(
-        self, stones: Pebbles, parked: Array, model: Any, physics: Any, foot_radius: float
+        self, stones: Pebbles, count: int, model: Any, physics: Any, foot_radius: float
     ) -> None:
-        """Take over the last bodies of a world.
-
-        Args:
-            stones: as they lie at first.
-            parked: poses of the bodies while they are not in use, shape (p, 7), m, world; as many
-                of each size, ordered by size.
-            model: the compiled world.
-            physics: its state.
-            foot_radius: radius of the robots' feet, m.
-        """
-        self._parked, count = parked, len(parked)
+        """Take over the last `count` bodies of a compiled world; `foot_radius` is in m."""
+        self._parked = model.qpos0[-7 * count :].reshape(count, 7)
         self._q = physics.qpos[-7 * count :].reshape(count, 7)
         self._v = physics.qvel[-6 * count :].reshape(count, 6)
         self._warm = physics.qacc_warmstart[-6 * count :].reshape(count, 6)
@@ -172,21 +142,15 @@ class LooseStones:
         self._touching = foot_radius + float(stones.half.max())
         self._near = self._touching + _MARGIN
         self._on_top = 2.0 * float(stones.half[:, 2].max()) + foot_radius
-        self.pose = stones.pose.copy()
-        self.stone_of = np.full(count, _NOBODY)
+        self.pose = stones.pose.copy()  # of every stone, as of when it last lay still
+        self.stone_of = np.full(count, _NOBODY)  # the stone that each body is lent to
         self.without = 0
         self._cells: defaultdict[tuple[int, int], set[int]] = defaultdict(set)
         for stone in range(len(self.pose)):
             self._cells[self._cell(self.pose[stone])].add(stone)
 
     def follow(self, feet: Array) -> None:
-        """Lend bodies to stones near low feet, take them from stones that lie still.
-
-        To be called between the integration of a tick and the evaluation of the next.
-
-        Args:
-            feet: centres of all feet, shape (f, 3), m, world.
-        """
+        """See `MovingBodies`: lend bodies to stones near low feet, take them from those at rest."""
         low = feet[feet[:, 2] < self._on_top + _LOW]
         self._put_to_rest(low[:, :2])
         for stone in self._asleep_near(low):
@@ -197,15 +161,11 @@ class LooseStones:
 
     def _asleep_near(self, feet: Array) -> list[int]:
         """Stones without a body that a foot is near, but not inside, in order."""
-        stones: set[int] = set()
+        stones = set[int]()
         for x, y, z in feet.tolist():
-            i, j = self._cell(np.array((x, y)))
-            around = [
-                s
-                for a in (-1, 0, 1)
-                for b in (-1, 0, 1)
-                for s in self._cells.get((i + a, j + b), ())
-            ]
+            i, j = int(x // self._near), int(y // self._near)
+            cells = (self._cells.get((i + a, j + b), ()) for a in (-1, 0, 1) for b in (-1, 0, 1))
+            around = [stone for cell in cells for stone in cell]
             if around:
                 places = self.pose[around, :2]
                 square = (places[:, 0] - x) ** 2 + (places[:, 1] - y) ** 2

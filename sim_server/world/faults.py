@@ -6,10 +6,8 @@ commas between faults.
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -19,8 +17,9 @@ from quadriga.shared import codes
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError, did_you_mean
 from quadriga.shared.messages import Command, Event, Flat, State
-from quadriga.shared.robots.conventions import JOINT_NAMES, N_JOINTS, Array, Leg, robot_names
+from quadriga.shared.robots.conventions import JOINT_NAMES, Array, Leg, robot_names
 from quadriga.shared.robots.spec import RobotSpec
+from quadriga.sim_server.world.scenario import LATEST, read_number
 
 OFF: Final = "off"
 STUCK: Final = "stuck"
@@ -40,10 +39,9 @@ KINDS: Final = {
     INTERMITTENT: "off for a random half of all spans of 50 ms",
 }
 SPAN_MS: Final = 50  # of what is slow, delayed or intermittent
-_AHEAD_MS: Final = SPAN_MS + 10  # from a word to the fault that it asks for
+_AHEAD_MS: Final = SPAN_MS + 10  # from a request to the fault that it asks for
 _KEY: Final = "world.faults"
 _GRAMMAR: Final = "'robot/component kind start[s] [duration[s]]', commas between faults"
-_LATEST: Final = 3600.0  # s
 _STREAM: Final = 5  # of the seed; terrain, sensors, pushes and motors draw from others
 _OFF_BY: Final = 0.2  # rad, an angle that is wrong
 _GYRO_MOST: Final = 35.0  # rad/s, 2000 °/s: the range of usual gyros
@@ -54,22 +52,14 @@ Columns = NDArray[np.intp]
 
 
 class Component(NamedTuple):
-    """A part of a robot that can be faulty.
+    """A part of a robot that can be faulty."""
 
-    Attributes:
-        message: `State` of a sensor, `Command` of a motor.
-        columns: its numbers in the message's row.
-        wrong: from sound numbers to those that it has when it is wrong.
-        low, high: between these it draws its numbers when it gives garbage.
-        unit_length: whether its numbers are an orientation: garbage has unit length.
-    """
-
-    message: type[Flat]
-    columns: Columns
-    wrong: Callable[[Array], Array]
-    low: Array
+    message: type[Flat]  # `State` of a sensor, `Command` of a motor
+    columns: Columns  # its numbers in the message's row
+    low: Array  # between this and `high` it draws its numbers when it gives garbage
     high: Array
-    unit_length: bool = False
+    wrong: Callable[[Array], Array] = np.negative  # from sound to wrong numbers
+    unit_length: bool = False  # whether they are an orientation: garbage has unit length
 
 
 def build_components(robot: RobotSpec) -> Mapping[str, tuple[Component, ...]]:
@@ -79,61 +69,52 @@ def build_components(robot: RobotSpec) -> Mapping[str, tuple[Component, ...]]:
     all joints and `encoder_FL_hip` …, `feet` and `foot_FL` …; motors are `motors`, `motor_FL` with
     the three of a leg …, and `motor_FL_hip` ….
     """
-    joints = np.arange(N_JOINTS)
-    names = [name.removesuffix("_joint") for name in JOINT_NAMES]
-    quat = _columns(State, "imu_quat_wxyz")
-    attitude = Component(State, quat, _tilt, np.full(4, -1.0), np.ones(4), unit_length=True)
-    gyro = _mirrored("imu_gyro", -_GYRO_MOST, _GYRO_MOST)
-    accel = _mirrored("imu_accel", -_ACCEL_MOST, _ACCEL_MOST)
+    every = slice(None)
+    joints = {n.removesuffix("_joint"): slice(k, k + 1) for k, n in enumerate(JOINT_NAMES)}
+    attitude = _sensor("imu_quat_wxyz", -1.0, 1.0)._replace(wrong=_tilt, unit_length=True)
+    gyro = _sensor("imu_gyro", -_GYRO_MOST, _GYRO_MOST)
+    accel = _sensor("imu_accel", -_ACCEL_MOST, _ACCEL_MOST)
     parts = {"attitude": attitude, "gyro": gyro, "accel": accel}
-    parts["encoders"] = _encoders(robot, joints)
-    one = {name: joints[k : k + 1] for k, name in enumerate(names)}
-    parts |= {f"encoder_{name}": _encoders(robot, joint) for name, joint in one.items()}
-    parts["feet"] = _mirrored("foot_force", 0.0, _FOOT_MOST)
-    for leg in Leg:
-        parts[f"foot_{leg.name}"] = _mirrored("foot_force", 0.0, _FOOT_MOST, leg)
-    parts["motors"] = _motors(robot, joints)
-    parts |= {f"motor_{leg.name}": _motors(robot, joints[3 * leg : 3 * leg + 3]) for leg in Leg}
-    parts |= {f"motor_{name}": _motors(robot, joint) for name, joint in one.items()}
+    parts["encoders"] = _encoders(robot, every)
+    parts |= {f"encoder_{name}": _encoders(robot, joint) for name, joint in joints.items()}
+    for name, feet in [("feet", every), *((f"foot_{g.name}", slice(g, g + 1)) for g in Leg)]:
+        parts[name] = _sensor("foot_force", 0.0, _FOOT_MOST, feet)
+    legs = {leg.name: slice(3 * leg, 3 * leg + 3) for leg in Leg}
+    parts["motors"] = _motors(robot, every)
+    parts |= {f"motor_{name}": _motors(robot, part) for name, part in (legs | joints).items()}
     return {"imu": (attitude, gyro, accel), **{name: (part,) for name, part in parts.items()}}
 
 
-def _columns(message: type[Flat], field: str) -> Columns:
-    cut = message.CUTS[field]
-    return np.arange(cut.start, cut.stop)
+def _columns(message: type[Flat], fields: Sequence[str], part: slice) -> Columns:
+    cuts = [message.CUTS[field] for field in fields]
+    return np.concatenate([np.arange(cut.start, cut.stop)[part] for cut in cuts])
 
 
-def _mirrored(field: str, low: float, high: float, leg: Leg | None = None) -> Component:
-    """A sensor whose wrong numbers have the opposite sign; of feet that of one leg."""
-    columns = _columns(State, field)
-    columns = columns if leg is None else columns[leg : leg + 1]
-    n = len(columns)
-    return Component(State, columns, np.negative, np.full(n, low), np.full(n, high))
+def _sensor(field: str, low: float, high: float, part: slice = slice(None)) -> Component:
+    """A sensor whose wrong numbers have the opposite sign."""
+    columns = _columns(State, (field,), part)
+    return Component(State, columns, np.full(len(columns), low), np.full(len(columns), high))
 
 
-def _encoders(robot: RobotSpec, joints: Columns) -> Component:
-    n, speed = len(joints), np.tile(robot.speed, 4)[joints]
-    columns = np.concatenate([_columns(State, name)[joints] for name in ("q_joint", "v_joint")])
-    low = np.concatenate([np.array(robot.lower)[joints], -speed])
-    high = np.concatenate([np.array(robot.upper)[joints], speed])
+def _encoders(robot: RobotSpec, joints: slice) -> Component:
+    """Encoders of these joints; of wrong ones the angles are off and the rates opposite."""
+    speed = np.tile(robot.speed, 4)
+    low, high = (
+        np.concatenate([np.array(angles)[joints], rates[joints]])
+        for angles, rates in ((robot.lower, -speed), (robot.upper, speed))
+    )
+    sign, off = np.repeat([[1.0, -1.0], [_OFF_BY, 0.0]], len(low) // 2, axis=1)
+    columns = _columns(State, ("q_joint", "v_joint"), joints)
+    return Component(State, columns, low, high, lambda values: sign * values + off)
 
-    def be_wrong(values: Array) -> Array:
-        return np.concatenate([values[:n] + _OFF_BY, -values[n:]])
 
-    return Component(State, columns, be_wrong, low, high)
-
-
-def _motors(robot: RobotSpec, joints: Columns) -> Component:
+def _motors(robot: RobotSpec, joints: slice) -> Component:
     """Motors of these joints; a wrong one gives the opposite torque."""
-    n, torque = len(joints), robot.torque_limit[joints]
-    fields = ("tau", "kp", "kd", "q_des", "v_des")
-    columns = np.concatenate([_columns(Command, name)[joints] for name in fields])
-    high = np.concatenate([torque, np.zeros(4 * n)])
-
-    def be_wrong(values: Array) -> Array:
-        return np.concatenate([-values[: 3 * n], values[3 * n :]])
-
-    return Component(Command, columns, be_wrong, -high, high)
+    torque = robot.torque_limit[joints]
+    high = np.concatenate([torque, np.zeros(4 * len(torque))])
+    sign = np.repeat([-1.0, -1.0, -1.0, 1.0, 1.0], len(torque))
+    columns = _columns(Command, ("tau", "kp", "kd", "q_des", "v_des"), joints)
+    return Component(Command, columns, -high, high, lambda values: sign * values)
 
 
 def _tilt(quat_wxyz: Array) -> Array:
@@ -143,27 +124,14 @@ def _tilt(quat_wxyz: Array) -> Array:
     return np.array([c * w - s * x, c * x + s * w, c * y + s * z, c * z - s * y])
 
 
-@dataclass(frozen=True, slots=True)
-class ComponentFault:
-    """What is wrong with one component of one robot, in ticks `start` to `stop` − 1.
+class ComponentFault(NamedTuple):
+    """What is wrong with one component of one robot, in ticks `start` to `stop` − 1."""
 
-    Attributes:
-        robot: its name.
-        component: a name of `build_components`.
-        kind: a name of `KINDS`.
-        start: tick, ms.
-        stop: tick, ms; None: it never ends.
-    """
-
-    robot: str
-    component: str
-    kind: str
-    start: int
-    stop: int | None = None
-
-    def holds(self, tick: int) -> bool:
-        """Whether the component is faulty at this tick."""
-        return self.start <= tick and (self.stop is None or tick < self.stop)
+    robot: str  # its name
+    component: str  # a name of `build_components`
+    kind: str  # a name of `KINDS`
+    start: int  # tick, ms
+    stop: int | None = None  # None: it never ends
 
     @property
     def detail(self) -> str:
@@ -176,17 +144,11 @@ def parse_faults(
 ) -> tuple[ComponentFault, ...]:
     """The faults that a text describes, in the order written; empty text means none.
 
-    Args:
-        text: of the grammar above.
-        robots: names of the team's robots.
-        components: names of what can be faulty.
-
     Raises:
         ConfigError: the text does not follow the grammar, or names what there is not.
     """
-    if not text:
-        return ()
-    found = tuple(_parse(part.strip(), robots, components) for part in text.split(","))
+    parts = text.split(",") if text else ()
+    found = tuple(_parse(part.strip(), robots, components) for part in parts)
     for fault in found:
         if found.count(fault) > 1:
             raise ConfigError(_KEY, f"{fault.robot}/{fault.detail} twice", "each fault once")
@@ -220,31 +182,17 @@ def _parse(part: str, robots: tuple[str, ...], components: tuple[str, ...]) -> C
         if word not in known:
             hint = did_you_mean(word, known)
             raise ConfigError(_KEY, f"{what} {word!r}", f"one of {', '.join(known)}", hint)
-    first = _milliseconds("start", words[2], part, 0.0)
-    stop = first + _milliseconds("duration", words[3], part, 1e-3) if len(words) == 4 else None
-    return ComponentFault(robot, component, kind, first, stop)
-
-
-def _milliseconds(what: str, word: str, part: str, least: float) -> int:
-    try:
-        value = float(word)
-    except ValueError:
-        value = math.nan
-    if not least <= value <= _LATEST:  # this way round, it refuses what is not a number, too
-        raise ConfigError(_KEY, f"{what} {word!r} in {part!r}", f"{least:g} … {_LATEST:g} s")
-    return round(1000 * value)
+    start = round(1000 * read_number(_KEY, "start", words[2], part, 0.0, LATEST))
+    if len(words) == 3:
+        return ComponentFault(robot, component, kind, start)
+    duration = read_number(_KEY, "duration", words[3], part, 1e-3, LATEST)
+    return ComponentFault(robot, component, kind, start, start + round(1000 * duration))
 
 
 class Distortion:
-    """One fault at one component; its memory is what the component said before.
+    """One fault at one component, with its own source of chance.
 
-    Args:
-        fault: what is wrong, and when.
-        component: whose numbers it changes.
-        random: its own source of chance.
-
-    Attributes:
-        component: as given.
+    It remembers what the component said before.
     """
 
     def __init__(
@@ -257,27 +205,20 @@ class Distortion:
         self._off = False
 
     def distort(self, tick: int, values: Array) -> Array:
-        """The component's numbers at a tick, of the sound ones.
-
-        Args:
-            tick: one more than at the last call.
-            values: sound numbers, in the order of the component's columns.
-        """
+        """The component's numbers at a tick, one more than at the last call, of the sound ones."""
         fault, component = self._fault, self.component
-        if not fault.holds(tick):
+        if tick < fault.start or (fault.stop is not None and tick >= fault.stop):
             self._sound.append(values)
             return values
-        before = self._sound[-1] if self._sound else values
         if fault.kind == DELAYED:
             self._sound.append(values)
             return self._sound[0]
         if self._held is None or (tick - fault.start) % SPAN_MS == 0:
-            self._held = values
-            self._off = bool(self._random.random() < 0.5)
+            self._held, self._off = values, bool(self._random.random() < 0.5)
         if fault.kind == OFF or (fault.kind == INTERMITTENT and self._off):
             return np.zeros_like(values)
         if fault.kind == STUCK:
-            return before
+            return self._sound[-1] if self._sound else values
         if fault.kind == WRONG:
             return component.wrong(values)
         if fault.kind == SLOW:
@@ -289,14 +230,10 @@ class Distortion:
 
 
 class Injection:
-    """The faults of `world.faults`, and those added later; without any it costs nothing.
+    """The faults of `world.faults`, and those added later, at the robots `names` of a world.
 
     Attributes:
         events: when each fault of the configuration begins and ends.
-
-    Args:
-        config: the team's configuration.
-        names: of the robots that are in the world, in the order of their rows.
 
     Raises:
         ConfigError: `world.faults` does not parse, or names what there is not.
@@ -306,8 +243,7 @@ class Injection:
         self._components = build_components(config.robot)
         self._team, self._names = robot_names(config.team.robots), tuple(names)
         self._seed, self._count = config.world.seed, 0
-        self._sensors: dict[str, list[Distortion]] = {}
-        self._motors: dict[int, list[Distortion]] = {}
+        self._distortions: dict[tuple[type[Flat], str], list[Distortion]] = {}
         self.events = self.add(config.world.faults)
 
     def add(self, text: str) -> list[Event]:
@@ -318,44 +254,35 @@ class Injection:
         """
         found = list[Event]()
         for fault in parse_faults(text, self._team, tuple(self._components)):
-            self._add(fault)
-            found.append(Event.of(fault.start, codes.FAULT_BEGINS, fault.robot, fault.detail))
-            if fault.stop is not None:
-                detail = f"{fault.component} sound again"
-                found.append(Event.of(fault.stop, codes.FAULT_ENDS, fault.robot, detail))
+            robot, component, _, start, stop = fault
+            parts = self._components[component] if robot in self._names else ()
+            for part, of_part in enumerate(parts):
+                chance = np.random.default_rng((self._seed, _STREAM, self._count, part))
+                made = Distortion(fault, of_part, chance)
+                self._distortions.setdefault((of_part.message, robot), []).append(made)
+            self._count += 1
+            found.append(Event.of(start, codes.FAULT_BEGINS, robot, fault.detail))
+            if stop is not None:
+                found.append(Event.of(stop, codes.FAULT_ENDS, robot, f"{component} sound again"))
         return found
-
-    def _add(self, fault: ComponentFault) -> None:
-        number, self._count = self._count, self._count + 1
-        if fault.robot not in self._names:
-            return
-        for part, component in enumerate(self._components[fault.component]):
-            chance = np.random.default_rng((self._seed, _STREAM, number, part))
-            made = Distortion(fault, component, chance)
-            if component.message is State:
-                self._sensors.setdefault(fault.robot, []).append(made)
-            else:
-                self._motors.setdefault(self._names.index(fault.robot), []).append(made)
 
     def distort_states(self, states: Mapping[str, State]) -> dict[str, State]:
         """What faulty sensors make of the states of a tick, by robot; called once a tick."""
         distorted = dict(states)
-        for name, distortions in self._sensors.items():
-            state = states[name]
-            row = _distort(state.row, state.tick, distortions)
-            distorted[name] = State.from_row(state.tick, state.stamp_ns, row)
+        for (message, name), distortions in self._distortions.items():
+            if message is State:
+                tick, stamp_ns = states[name].tick, states[name].stamp_ns
+                row = _distort(states[name].row, tick, distortions)
+                distorted[name] = State.from_row(tick, stamp_ns, row)
         return distorted
 
     def distort_commands(self, tick: int, rows: Sequence[Array]) -> list[Array]:
-        """What faulty motors make of the rows of `Command`s of a tick; called once a tick.
-
-        Args:
-            tick: at which the motors are driven.
-            rows: one for each robot of the world, (60,).
-        """
+        """What faulty motors make of the robots' `Command`s, rows (60,); called once a tick."""
         distorted = list(rows)
-        for index, distortions in self._motors.items():
-            distorted[index] = _distort(rows[index], tick, distortions)
+        for (message, name), distortions in self._distortions.items():
+            if message is Command:
+                index = self._names.index(name)
+                distorted[index] = _distort(rows[index], tick, distortions)
         return distorted
 
 

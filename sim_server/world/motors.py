@@ -39,44 +39,20 @@ _TICK: Final = 1e-3  # s
 _WARM: Final = 0.8  # of the temperature that continuous torque reaches: from here on torque falls
 _CREEP: Final = 0.05  # rad/s, v₀: a joint slower than this may be kept still by dry friction
 # Where a command's row has its fields.
-_TAU: Final = Command.CUTS["tau"]
-_Q_DES: Final = Command.CUTS["q_des"]
-_V_DES: Final = Command.CUTS["v_des"]
-_KP: Final = Command.CUTS["kp"]
-_KD: Final = Command.CUTS["kd"]
+_TAU, _Q_DES, _V_DES, _KP, _KD = (
+    Command.CUTS[name] for name in ("tau", "q_des", "v_des", "kp", "kd")
+)
 
 
 class MotorData(NamedTuple):
-    """What motors and joints are like; arrays are by joint, (12,).
+    """What motors and joints are like; arrays are by joint, (12,)."""
 
-    Attributes:
-        curves: torque limits of a cool motor.
-        continuous: torque limit of a hot one, N·m.
-        follow: share of a torque error that is made up for in a tick.
-        friction: dry friction, N·m.
-        viscous: friction by rate, N·m·s/rad.
-        heating: share of a tick in the filter of the temperature; 0: it stays.
-    """
-
-    curves: MotorCurves
-    continuous: Array
-    follow: float
-    friction: float
-    viscous: float
-    heating: float
-
-
-def motor_data(robot: RobotSpec, config: MotorsConfig) -> MotorData:
-    """The motors of a robot as a configuration has them."""
-    lag = 1.0 - math.exp(-2.0 * math.pi * config.bandwidth * _TICK)
-    return MotorData(
-        curves=motor_curves(robot, torque_speed=config.torque_speed),
-        continuous=np.tile(robot.continuous_torque, N_LEGS),
-        follow=lag if config.bandwidth > 0.0 else 1.0,
-        friction=config.friction,
-        viscous=config.viscous_friction,
-        heating=_TICK / config.heat_time if config.heat_time > 0.0 else 0.0,
-    )
+    curves: MotorCurves  # torque limits of a cool motor
+    continuous: Array  # torque limit of a hot one, N·m
+    follow: float  # share of a torque error that is made up for in a tick
+    friction: float  # dry friction, N·m
+    viscous: float  # friction by rate, N·m·s/rad
+    heating: float  # share of a tick in the filter of the temperature; 0: it stays
 
 
 class Motors:
@@ -90,11 +66,17 @@ class Motors:
 
     def __init__(self, robot: RobotSpec, config: MotorsConfig, robots: int, idle: Command) -> None:
         """Cool motors that have got the command `idle` so far."""
-        shape = (robots, N_JOINTS)
-        self.torque, self.joint_torque = np.zeros(shape), np.zeros(shape)
-        self.heat = np.zeros(shape)
-        self._sound = np.zeros(shape)
-        self._data = motor_data(robot, config)
+        self._memory = np.zeros((4, robots, N_JOINTS))
+        self.torque, self.joint_torque, self.heat, _ = self._memory
+        lag = 1.0 - math.exp(-2.0 * math.pi * config.bandwidth * _TICK)
+        self._data = MotorData(
+            curves=motor_curves(robot, torque_speed=config.torque_speed),
+            continuous=np.tile(robot.continuous_torque, N_LEGS),
+            follow=lag if config.bandwidth > 0.0 else 1.0,
+            friction=config.friction,
+            viscous=config.viscous_friction,
+            heating=_TICK / config.heat_time if config.heat_time > 0.0 else 0.0,
+        )
         on_the_way = [np.tile(idle.row, (robots, 1)) for _ in range(config.delay_ms)]
         self._on_the_way: deque[Array] = deque(on_the_way)
 
@@ -112,29 +94,15 @@ class Motors:
             v: velocities, its joints behind the trunk's six, (n, 18).
             strength: the share of its limited torque that each motor gives, (n, 12).
         """
-        _drive(arrived, q, v, strength, self._data, self._sound, self.heat, self.torque)
-        _take_off_friction(v, self.torque, self._data, self.joint_torque)
-
-
-@compiled
-def derated(peak: float, continuous: float, heat: float) -> float:
-    """What temperature leaves of a motor's torque limit, N·m."""
-    share = min(1.0, max(0.0, (1.0 - heat) / (1.0 - _WARM)))
-    return continuous + share * (peak - continuous)
+        _drive(arrived, q, v, strength, self._data, self._memory)
 
 
 @compiled
 def _drive(
-    commands: Array,
-    q: Array,
-    v: Array,
-    strength: Array,
-    data: MotorData,
-    sound: Array,
-    heat: Array,
-    torque: Array,
+    commands: Array, q: Array, v: Array, strength: Array, data: MotorData, memory: Array
 ) -> None:
-    """Fill `torque`, and advance what sound motors would give and the temperatures, (n, 12)."""
+    """Advance torques, what of them is left for the joints, heat and what sound motors give."""
+    torque, left, heat, sound = memory[0], memory[1], memory[2], memory[3]
     for i in range(len(commands)):
         row, angles, rates = commands[i], q[i, JOINT_POSITIONS], v[i, JOINT_RATES]
         tau_ff, q_des, v_des = row[_TAU], row[_Q_DES], row[_V_DES]
@@ -146,7 +114,9 @@ def _drive(
             lower, upper = torque_range(rates[k], data.curves, k)
             if data.heating > 0.0:
                 # Heat limits the current, speed the voltage: the lower limit holds.
-                limit = derated(data.curves.peak[k], data.continuous[k], heat[i, k])
+                peak, continuous = data.curves.peak[k], data.continuous[k]
+                cool = min(1.0, max(0.0, (1.0 - heat[i, k]) / (1.0 - _WARM)))
+                limit = continuous + cool * (peak - continuous)
                 lower, upper = max(lower, -limit), min(upper, limit)
             wanted = min(max(wanted, lower), upper)
             if data.follow < 1.0:
@@ -155,14 +125,6 @@ def _drive(
             torque[i, k] = strength[i, k] * sound[i, k]
             loss = (torque[i, k] / data.continuous[k]) ** 2
             heat[i, k] += data.heating * (loss - heat[i, k])
-
-
-@compiled
-def _take_off_friction(v: Array, torque: Array, data: MotorData, left: Array) -> None:
-    """Fill `left` with what friction leaves of the motors' torques, (n, 12)."""
-    for i in range(len(v)):
-        rates = v[i, JOINT_RATES]
-        for k in range(N_JOINTS):
             left[i, k] = torque[i, k]
             if data.friction > 0.0 or data.viscous > 0.0:
                 left[i, k] -= data.friction * math.tanh(rates[k] / _CREEP) + data.viscous * rates[k]

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
-from typing import Final
+from typing import Any, Final
 
 import mujoco
 import numpy as np
 
 from quadriga.shared.config.motors import MotorsConfig
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.robots.conventions import FOOT_FRAMES, JOINT_NAMES, Array
+from quadriga.shared.robots.conventions import FOOT_FRAMES, JOINT_NAMES, Array, Leg
 from quadriga.shared.robots.spec import RobotSpec
-from quadriga.sim_server.terrain.relief import LEG_CONTACT, NO_CONTACT, ROBOT_CONTACT
+from quadriga.sim_server.terrain.terrain import LEG_CONTACT, NO_CONTACT, ROBOT_CONTACT
 
 TRUNK: Final = "trunk"  # the trunk's body and box, whatever the URDF calls its link
 VISUAL_GROUP: Final = 1
@@ -34,10 +34,7 @@ class RobotBody:
     Children are added in the order of their joints' names, which is Pinocchio's joint order, so
     joint vectors need no permutation between the two. Links on fixed joints become welded bodies.
 
-    Args:
-        robot: its kind.
-        motors: what its joints are like.
-        leg_collisions: whether its limbs collide, with the ground and with other legs.
+    With `leg_collisions` its limbs touch the ground and other legs.
 
     Raises:
         ConfigError: the URDF is not installed or uses something this parser does not know.
@@ -46,11 +43,8 @@ class RobotBody:
     def __init__(self, robot: RobotSpec, motors: MotorsConfig, *, leg_collisions: bool) -> None:
         self._robot, self._motors = robot, motors
         self._contact = LEG_CONTACT if leg_collisions else ROBOT_CONTACT
-        self._limb = {
-            "hip": ROBOT_CONTACT if leg_collisions else NO_CONTACT,
-            "thigh": LEG_CONTACT if leg_collisions else NO_CONTACT,
-            "calf": LEG_CONTACT if leg_collisions else NO_CONTACT,
-        }
+        of_limbs = {"hip": ROBOT_CONTACT, "thigh": LEG_CONTACT, "calf": LEG_CONTACT}
+        self._limb = of_limbs if leg_collisions else dict.fromkeys(of_limbs, NO_CONTACT)
         root = robot.urdf_tree()
         self._links = {str(link.get("name")): link for link in root.findall("link")}
         self._joints: dict[str, list[ET.Element]] = {name: [] for name in self._links}
@@ -65,16 +59,17 @@ class RobotBody:
         friction: float,
         rgba: tuple[float, float, float, float],
     ) -> mujoco.MjsBody:
-        """Add one robot on a free joint and return its trunk body.
+        """Add one robot on a free joint, level and with yaw zero; its trunk body.
 
         Args:
             spec: the world under construction.
             prefix: put before every name of the robot, e.g. `r1/`.
-            pos: spawn position of the trunk's origin, world, m; the trunk is level, yaw zero.
+            pos: of the trunk's origin, world, m.
             friction: sliding friction of feet and trunk on the terrain.
             rgba: colour of the trunk.
         """
         robot = self._robot
+        surface = {"mass": 0.0, "priority": 1, "friction": [friction, 0.005, 0.0001]}
         trunk = spec.worldbody.add_body(name=prefix + TRUNK, pos=pos)
         trunk.add_freejoint(name=prefix + "free")
         trunk.add_site(name=prefix + "imu", pos=robot.imu, group=4)
@@ -83,39 +78,37 @@ class RobotBody:
             type=mujoco.mjtGeom.mjGEOM_BOX,
             size=[length / 2 for length in robot.trunk_box],
             rgba=rgba,
-            mass=0.0,
-            priority=1,
-            friction=[friction, 0.005, 0.0001],
+            **surface,
             **self._contact,
         )
-        self._fill(trunk, robot.trunk_link, prefix, friction)
-        for foot in FOOT_FRAMES:
+        self._fill(trunk, robot.trunk_link, prefix, surface)
+        for leg in Leg:
             # The hip lies between them, and its range keeps them apart, but a box is no shell.
-            thigh = foot.replace("foot", "thigh")
-            spec.add_exclude(bodyname1=prefix + TRUNK, bodyname2=prefix + thigh)
+            spec.add_exclude(bodyname1=prefix + TRUNK, bodyname2=f"{prefix}{leg.name}_thigh")
         return trunk
 
-    def _fill(self, body: mujoco.MjsBody, link: str, prefix: str, friction: float) -> None:
-        robot = self._robot
+    def _fill(self, body: mujoco.MjsBody, link: str, prefix: str, surface: dict[str, Any]) -> None:
         _set_inertia(body, self._links[link])
         if link in FOOT_FRAMES:
-            _add_foot(body, prefix + link, robot.geometry.foot_radius, friction, self._contact)
+            sphere, radius = mujoco.mjtGeom.mjGEOM_SPHERE, self._robot.geometry.foot_radius
+            foot = {"name": prefix + link, "type": sphere}
+            look = {"rgba": _FOOT_RGBA, "solref": FOOT_SOLREF}
+            body.add_geom(size=[radius, 0.0, 0.0], **foot, **look, **surface, **self._contact)
+            body.add_site(size=[_TOUCH * radius, 0.0, 0.0], group=4, **foot)
         for joint in self._joints[link]:
             name = _child(joint, "child").get("link", "")
             kind = joint.get("type")
             if kind == "fixed" and not _mass(self._links[name]):
                 continue  # only a frame, which neither MuJoCo nor the controller needs
             pos = _origin(joint)
-            child = body.add_body(name=prefix + name, pos=pos)
-            child.quat = _rotation(joint)
+            child = body.add_body(name=prefix + name, pos=pos, quat=_rotation(joint))
             if kind == "revolute":
                 self._add_joint(child, joint, prefix)
             elif kind != "fixed":
-                raise ConfigError(
-                    "the robot's URDF", f"a joint of type {kind!r}", "fixed or revolute"
-                )
-            self._add_limb(body, link, name, pos, friction)
-            self._fill(child, name, prefix, friction)
+                got, expected = f"a joint of type {kind!r}", "fixed or revolute"
+                raise ConfigError("the robot's URDF", got, expected)
+            self._add_limb(body, link, name, pos, surface)
+            self._fill(child, name, prefix, surface)
 
     def _add_joint(self, body: mujoco.MjsBody, joint: ET.Element, prefix: str) -> None:
         name, limit = str(joint.get("name")), _child(joint, "limit")
@@ -132,47 +125,18 @@ class RobotBody:
             added.armature = float(self._robot.rotor_inertias[JOINT_NAMES.index(name)])
 
     def _add_limb(
-        self, body: mujoco.MjsBody, link: str, child: str, end: list[float], friction: float
+        self, body: mujoco.MjsBody, link: str, child: str, end: list[float], surface: dict[str, Any]
     ) -> None:
         """A capsule from the link's origin to its child's, without mass."""
         leg, _, part = link.partition("_")
-        radius = _LIMB_RADIUS.get(part)
-        if radius is None:
+        if part not in _LIMB_RADIUS:
             return
         # Covers of motors hang on a link as its children too, but the limb leads to the next one.
-        next_one = _NEXT.get(part, "")
-        contact = self._limb[part] if child == f"{leg}_{next_one}" else NO_CONTACT
-        body.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_CAPSULE,
-            fromto=[0.0, 0.0, 0.0, *end],
-            size=[radius, 0.0, 0.0],
-            mass=0.0,
-            rgba=_LIMB_RGBA,
-            group=VISUAL_GROUP,
-            solref=_LIMB_SOLREF,
-            priority=1,
-            friction=[friction, 0.005, 0.0001],
-            **contact,
-        )
-
-
-def _add_foot(
-    body: mujoco.MjsBody, name: str, radius: float, friction: float, contact: Mapping[str, int]
-) -> None:
-    body.add_geom(
-        name=name,
-        type=mujoco.mjtGeom.mjGEOM_SPHERE,
-        size=[radius, 0.0, 0.0],
-        mass=0.0,
-        rgba=_FOOT_RGBA,
-        solref=FOOT_SOLREF,
-        priority=1,
-        friction=[friction, 0.005, 0.0001],
-        **contact,
-    )
-    body.add_site(
-        name=name, type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[_TOUCH * radius, 0.0, 0.0], group=4
-    )
+        contact = self._limb[part] if child == f"{leg}_{_NEXT[part]}" else NO_CONTACT
+        capsule, size = mujoco.mjtGeom.mjGEOM_CAPSULE, [_LIMB_RADIUS[part], 0.0, 0.0]
+        look = {"rgba": _LIMB_RGBA, "group": VISUAL_GROUP, "solref": _LIMB_SOLREF}
+        fromto = [0.0, 0.0, 0.0, *end]
+        body.add_geom(type=capsule, fromto=fromto, size=size, **look, **surface, **contact)
 
 
 def _set_inertia(body: mujoco.MjsBody, link: ET.Element) -> None:
@@ -186,7 +150,7 @@ def _set_inertia(body: mujoco.MjsBody, link: ET.Element) -> None:
     flat = np.empty(9)
     mujoco.mju_quat2Mat(flat, _rotation(inertial))
     R = flat.reshape(3, 3)
-    if not np.array_equal(R, np.eye(3)):
+    if not np.array_equal(R, np.eye(3)):  # else rounding would change it
         turned = R @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ R.T
         body.fullinertia = [*np.diag(turned), turned[0, 1], turned[0, 2], turned[1, 2]]
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -19,24 +19,26 @@ from quadriga.shared.robots.conventions import JOINT_NAMES, N_JOINTS, Array, rob
 
 _PUSHES, _MOTORS, _LOADS = 3, 4, 5  # streams of the seed: a new push changes no motor
 _PUSH: Final = "'robot:force[N]:direction[deg]:start[s]:duration[s]', commas between pushes"
-_MOTOR: Final = "'robot:joint:start[s]', commas between motors"
-_FORCE_LIMIT: Final = 5000.0  # N; beyond it the world is no longer stable
-_LATEST: Final = 3600.0  # s
+_MOTOR: Final = "'robot:joint:start[s]' or 'robot:joint:start[s]:share', commas between motors"
+_SHARE: Final = "0.6"  # of its torque that a weak motor gives where none is said
+LATEST: Final = 3600.0  # s
+_PUSH_NUMBERS: Final = (  # least and most; beyond 5000 N the world is no longer stable
+    ("force", 0.0, 5000.0),
+    ("direction", -360.0, 360.0),
+    ("start", 0.0, LATEST),
+    ("duration", 1e-3, LATEST),
+)
 _ANY: Final = "any"
+_STRENGTH: Final = "world.motor_strength"
 _JOINTS: Final = tuple(name.removesuffix("_joint") for name in JOINT_NAMES)
 
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """A robot's external load.
+    """A robot's external load."""
 
-    Attributes:
-        mass: kg; 0 if there is none.
-        offset: of its centre from the trunk's, along the trunk's x and y, m.
-    """
-
-    mass: float
-    offset: tuple[float, float] = (0.0, 0.0)
+    mass: float  # kg; 0 if there is none
+    offset: tuple[float, float] = (0.0, 0.0)  # of its centre from the trunk's, along its x, y, m
 
     @property
     def detail(self) -> str:
@@ -46,21 +48,13 @@ class Load:
         return f"{self.mass:.6g} kg{where}"
 
 
-@dataclass(frozen=True, slots=True)
-class Push:
-    """A constant horizontal force on the trunk's centre of mass, ticks `start` to `stop` − 1.
+class Push(NamedTuple):
+    """A constant horizontal force on the trunk's centre of mass, ticks `start` to `stop` − 1."""
 
-    Attributes:
-        robots: indices of the robots pushed, each with the whole force.
-        force: N.
-        direction: rad, world frame; 0 is along x (forward at the start), π/2 is left.
-        start, stop: ticks, ms.
-    """
-
-    robots: tuple[int, ...]
-    force: float
-    direction: float
-    start: int
+    robots: tuple[int, ...]  # indices of the robots pushed, each with the whole force
+    force: float  # N
+    direction: float  # rad, world frame; 0 is along x (forward at the start), π/2 is left
+    start: int  # tick, ms
     stop: int
 
     @property
@@ -70,73 +64,28 @@ class Push:
         return f"{towards} for {(self.stop - self.start) / 1000:g} s"
 
 
-@dataclass(frozen=True, slots=True)
-class WeakMotor:
-    """A motor that gives only `share` of its torque from tick `start` on.
+class WeakMotor(NamedTuple):
+    """A motor that gives only `share` of a sound one's torque from tick `start` on."""
 
-    Attributes:
-        robot: its index.
-        joint: its index in `JOINT_NAMES`.
-        start: tick, ms.
-        share: of the torque that a sound motor would give.
-    """
-
-    robot: int
-    joint: int
-    start: int
+    robot: int  # its index
+    joint: int  # its index in `JOINT_NAMES`
+    start: int  # tick, ms
     share: float
 
-    @property
-    def detail(self) -> str:
-        """Detail of the event that announces the weakening."""
-        return f"{_JOINTS[self.joint]} gives {100 * self.share:g} % of its torque"
 
+class Scenario(NamedTuple):
+    """The disturbances of a run and the events that announce them."""
 
-@dataclass(frozen=True, slots=True)
-class Scenario:
-    """The disturbances of a run and its announcements, by tick."""
-
-    n: int
-    pushes: tuple[Push, ...]
-    weak: tuple[WeakMotor, ...]
+    forces: Mapping[int, Array]  # on each robot from a tick on, (n, 3), N, world frame
+    strength: Mapping[int, Array]  # share of torque of each motor from a tick on, (n, 12)
     events: tuple[Event, ...]
-
-    def changes(self) -> frozenset[int]:
-        """Ticks at which the pushing forces change."""
-        return frozenset(t for push in self.pushes for t in (push.start, push.stop))
-
-    def forces(self, tick: int) -> Array:
-        """Sum of the pushes on each robot during `tick`. Shape (n, 3), N, world frame."""
-        total = np.zeros((self.n, 3))
-        for push in self.pushes:
-            if push.start <= tick < push.stop:
-                vector = [math.cos(push.direction), math.sin(push.direction), 0.0]
-                total[list(push.robots)] += push.force * np.array(vector)
-        return total
-
-    def weakenings(self) -> frozenset[int]:
-        """Ticks at which a motor weakens."""
-        return frozenset(motor.start for motor in self.weak)
-
-    def strength(self, tick: int) -> Array:
-        """Share of its torque that each motor gives during `tick`. Shape (n, 12)."""
-        strength = np.ones((self.n, N_JOINTS))
-        for motor in self.weak:
-            if motor.start <= tick:
-                place = motor.robot, motor.joint
-                strength[place] = min(strength[place], motor.share)
-        return strength
 
 
 def build_scenario(config: Config, loads: Sequence[Load]) -> Scenario:
-    """The scenario of a configuration.
-
-    Args:
-        config: the configuration.
-        loads: the load on each robot.
+    """The scenario of a configuration whose robots carry these loads.
 
     Raises:
-        ConfigError: `world.push` or `world.weak_motor` does not parse or names an unknown robot.
+        ConfigError: `world.push` or `world.motor_strength` does not parse or names no robot.
     """
     names, world = robot_names(config.team.robots), config.world
     pushes = parse_pushes(world.push, names)
@@ -146,15 +95,37 @@ def build_scenario(config: Config, loads: Sequence[Load]) -> Scenario:
     ground += f", seed {world.seed}" if TERRAINS[world.terrain].builder else ""
     events = [Event.of(0, codes.START, "", f"{len(names)} robots, {config.team.yokes} yokes")]
     events.append(Event.of(0, codes.TERRAIN, "", ground))
-    events += [
-        Event.of(0, codes.PAYLOAD, name, load.detail)
-        for name, load in zip(names, loads, strict=True)
-        if load.mass > 0.0
-    ]
-    events += [Event.of(m.start, codes.WEAK_MOTOR, names[m.robot], m.detail) for m in weak]
+    for name, load in zip(names, loads, strict=True):
+        if load.mass > 0.0:
+            events.append(Event.of(0, codes.PAYLOAD, name, load.detail))
+    for robot, joint, start, share in weak:
+        detail = f"{_JOINTS[joint]} gives {100 * share:g} % of its torque"
+        events.append(Event.of(start, codes.WEAK_MOTOR, names[robot], detail))
     for push in sorted(pushes, key=lambda item: item.start):
         events += [Event.of(push.start, codes.PUSH, names[i], push.detail) for i in push.robots]
-    return Scenario(n=len(names), pushes=pushes, weak=weak, events=tuple(events))
+    changes = {tick for push in pushes for tick in (push.start, push.stop)}
+    return Scenario(
+        forces={tick: _forces(pushes, tick, len(names)) for tick in changes},
+        strength={motor.start: _strength(weak, motor.start, len(names)) for motor in weak},
+        events=tuple(events),
+    )
+
+
+def _forces(pushes: Sequence[Push], tick: int, n: int) -> Array:
+    total = np.zeros((n, 3))
+    for push in pushes:
+        if push.start <= tick < push.stop:
+            vector = [math.cos(push.direction), math.sin(push.direction), 0.0]
+            total[list(push.robots)] += push.force * np.array(vector)
+    return total
+
+
+def _strength(weak: Sequence[WeakMotor], tick: int, n: int) -> Array:
+    strength = np.ones((n, N_JOINTS))
+    for robot, joint, start, share in weak:
+        if start <= tick:
+            strength[robot, joint] = min(strength[robot, joint], share)
+    return strength
 
 
 def build_loads(config: Config) -> tuple[Load, ...]:
@@ -201,65 +172,61 @@ def parse_pushes(text: str, names: tuple[str, ...]) -> tuple[Push, ...]:
     Raises:
         ConfigError: the text does not follow the grammar, or names a robot not in `names`.
     """
-    return tuple(_parse_push(part.strip(), names) for part in text.split(",")) if text else ()
+    pushes = list[Push]()
+    for part in text.split(",") if text else ():
+        robot, *numbers = (word.strip() for word in part.split(":"))
+        if len(numbers) != 4:
+            raise ConfigError("world.push", repr(part.strip()), _PUSH)
+        if robot != "all" and robot not in names:
+            raise ConfigError("world.push", f"robot {robot!r}", f"'all' or one of {list(names)}")
+        force, direction, start, duration = (
+            read_number("world.push", what, word, part.strip(), low, high)
+            for word, (what, low, high) in zip(numbers, _PUSH_NUMBERS, strict=True)
+        )
+        first, ms = round(start * 1000), round(duration * 1000)
+        robots = tuple(range(len(names))) if robot == "all" else (names.index(robot),)
+        pushes.append(Push(robots, force, math.radians(direction), first, first + ms))
+    return tuple(pushes)
 
 
-def _parse_push(part: str, names: tuple[str, ...]) -> Push:
-    robot, *numbers = (word.strip() for word in part.split(":"))
-    if len(numbers) != 4:
-        raise ConfigError("world.push", repr(part), _PUSH)
-    if robot != "all" and robot not in names:
-        raise ConfigError("world.push", f"robot {robot!r}", f"'all' or one of {list(names)}")
+def read_number(key: str, what: str, word: str, part: str, least: float, most: float) -> float:
+    """A number of a key's text, which must be one and within its limits.
+
+    Raises:
+        ConfigError: it is not.
+    """
     try:
-        force, direction, start, duration = (float(word) for word in numbers)
+        value = float(word)
     except ValueError:
-        raise ConfigError("world.push", repr(part), _PUSH, "a number is missing") from None
-    for what, value, low, high in (
-        ("force", force, 0.0, _FORCE_LIMIT),
-        ("direction", direction, -360.0, 360.0),
-        ("start", start, 0.0, _LATEST),
-        ("duration", duration, 1e-3, _LATEST),
-    ):
-        if not low <= value <= high:
-            expected = f"a {what} of {low:g} … {high:g}"
-            raise ConfigError("world.push", f"{what} {value:g} in {part!r}", expected)
-    first, ms = round(start * 1000), round(duration * 1000)
-    robots = tuple(range(len(names))) if robot == "all" else (names.index(robot),)
-    return Push(robots, force, math.radians(direction), first, first + ms)
+        value = math.nan
+    if not least <= value <= most:  # this way round, it refuses what is not a number, too
+        raise ConfigError(key, f"{what} {word!r} in {part!r}", f"{least:g} … {most:g}")
+    return value
 
 
 def weak_motors(config: Config, random: np.random.Generator) -> tuple[WeakMotor, ...]:
-    """The motors that `world.weak_motor` describes, in the order written.
+    """The motors that `world.motor_strength` describes, in the order written.
 
     Raises:
         ConfigError: the text does not follow the grammar, or names no such robot or joint.
     """
-    text, names = config.world.weak_motor, robot_names(config.team.robots)
-    if not text:
-        return ()
-    share = config.world.weak_share
-    return tuple(_parse_motor(part.strip(), names, share, random) for part in text.split(","))
-
-
-def _parse_motor(
-    part: str, names: tuple[str, ...], share: float, random: np.random.Generator
-) -> WeakMotor:
-    key, fields = "world.weak_motor", [word.strip() for word in part.split(":")]
-    if len(fields) != 3:
-        raise ConfigError(key, repr(part), _MOTOR)
-    robots = [i for i, name in enumerate(names) if fields[0] in (name, _ANY)]
-    joints = [i for i, name in enumerate(_JOINTS) if fields[1] in (name, *name.split("_"), _ANY)]
-    if not robots:
-        raise ConfigError(key, f"robot {fields[0]!r}", f"'any' or one of {', '.join(names)}")
-    if not joints:
-        expected = f"'any', a part, a leg or {_JOINTS[0]}"
-        cause = "parts are hip, thigh, calf; legs are FL, FR, RL, RR"
-        raise ConfigError(key, f"joint {fields[1]!r}", expected, cause)
-    try:
-        start = float(fields[2])
-    except ValueError:
-        start = math.nan
-    if not 0.0 <= start <= _LATEST:
-        raise ConfigError(key, f"start {fields[2]!r} in {part!r}", f"0 … {_LATEST:g} s")
-    robot, joint = int(random.choice(robots)), int(random.choice(joints))
-    return WeakMotor(robot, joint, round(1000 * start), share)
+    key, text, names = _STRENGTH, config.world.motor_strength, robot_names(config.team.robots)
+    weak = list[WeakMotor]()
+    for part in text.split(",") if text else ():
+        fields = [word.strip() for word in part.split(":")]
+        if len(fields) not in (3, 4):
+            raise ConfigError(key, repr(part.strip()), _MOTOR)
+        who, which, when, share = (*fields, _SHARE)[:4]
+        robots = [i for i, name in enumerate(names) if who in (name, _ANY)]
+        joints = [i for i, name in enumerate(_JOINTS) if which in (name, *name.split("_"), _ANY)]
+        if not robots:
+            raise ConfigError(key, f"robot {who!r}", f"'any' or one of {', '.join(names)}")
+        if not joints:
+            expected = f"'any', a part, a leg or {_JOINTS[0]}"
+            cause = "parts are hip, thigh, calf; legs are FL, FR, RL, RR"
+            raise ConfigError(key, f"joint {which!r}", expected, cause)
+        start = read_number(key, "start", when, part.strip(), 0.0, LATEST)
+        gives = read_number(key, "share", share, part.strip(), 0.0, 1.0)
+        robot, joint = int(random.choice(robots)), int(random.choice(joints))
+        weak.append(WeakMotor(robot, joint, round(1000 * start), gives))
+    return tuple(weak)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import accumulate
 from typing import Final
 
 import numpy as np
@@ -29,23 +30,14 @@ _STREAM: Final = 2  # of the seed: the terrain draws from another one
 _ERRORS: Final = 1  # of that stream, for all errors but noise and the IMU's biases
 # Columns of a robot's noise: joints, gyro, accelerometer and feet in the order of the fields of
 # `State`, then the attitude, whose noise is a rotation and is not added.
-_Q = slice(0, N_JOINTS)
-_V = slice(_Q.stop, _Q.stop + N_JOINTS)
-_TAU = slice(_V.stop, _V.stop + N_JOINTS)
-_GYRO = slice(_TAU.stop, _TAU.stop + 3)
-_ACCEL = slice(_GYRO.stop, _GYRO.stop + 3)
-_FOOT = slice(_ACCEL.stop, _ACCEL.stop + N_LEGS)
-_SUMS: Final = _FOOT.stop
-_TURN = slice(_FOOT.stop, _FOOT.stop + 3)
-
-# Places of the fields in a state's row.
-_STATE_Q: Final = State.CUTS["q_joint"]
-_STATE_V: Final = State.CUTS["v_joint"]
-_STATE_TAU: Final = State.CUTS["tau_joint"]
-_STATE_QUAT: Final = State.CUTS["imu_quat_wxyz"]
-_STATE_GYRO: Final = State.CUTS["imu_gyro"]
-_STATE_ACCEL: Final = State.CUTS["imu_accel"]
-_STATE_FOOT: Final = State.CUTS["foot_force"]
+_SIZES: Final = (N_JOINTS, N_JOINTS, N_JOINTS, 3, 3, N_LEGS, 3)
+_Q, _V, _TAU, _GYRO, _ACCEL, _FOOT, _TURN = (
+    slice(stop - size, stop) for size, stop in zip(_SIZES, accumulate(_SIZES), strict=True)
+)
+# Places of the fields in a state's row; the joints' three are one behind the other in both.
+_STATE_QUAT, _STATE_GYRO, _STATE_ACCEL, _STATE_FOOT = (
+    State.CUTS[name] for name in ("imu_quat_wxyz", "imu_gyro", "imu_accel", "foot_force")
+)
 _ROW: Final = _STATE_FOOT.stop  # numbers of a `State`
 _BLOCK: Final = 64  # ticks of noise drawn at once, because many small draws cost more
 _NEWTONS, _COUNTS, _NONE = 0, 1, 2  # what foot sensors measure, as compiled code is told
@@ -54,10 +46,6 @@ _INT16: Final = np.iinfo(np.int16)
 _MOST, _LEAST = float(_INT16.max), float(_INT16.min)
 
 Faults = NDArray[np.int8]
-
-# Q(p) with q ⊗ p = Q(p) q is _SIGN[a, b] · p[_INDEX[a, b]], quaternions wxyz.
-_INDEX: Final = np.array([[0, 1, 2, 3], [1, 0, 3, 2], [2, 3, 0, 1], [3, 2, 1, 0]])
-_SIGN: Final = np.array([[1, -1, -1, -1], [1, 1, 1, -1], [1, -1, 1, 1], [1, 1, -1, 1]], dtype=float)
 
 
 class FootSensors:
@@ -142,35 +130,26 @@ class Sensors:
         indices: Sequence[int] | None = None,
     ) -> None:
         """Sensors of the robots `names`; `indices` are theirs in the team, by default 0, 1, …."""
-        self._names = names
-        indices = range(len(names)) if indices is None else indices
+        self._names, n = names, len(names)
+        indices = range(n) if indices is None else indices
         self._streams = [np.random.default_rng((seed, _STREAM, i)) for i in indices]
-        self._sigma = np.empty(_TURN.stop)
-        for channel, sigma in (
-            (_Q, config.joint_position),
-            (_V, config.joint_velocity),
-            (_TAU, config.joint_torque),
-            (_GYRO, config.gyro),
-            (_ACCEL, config.accel),
-            (_FOOT, config.foot_force),
-            (_TURN, config.orientation),
-        ):
-            self._sigma[channel] = sigma
-        self._bias = np.zeros((len(names), _SUMS))
-        self._tilt, self._yaw_rate = np.zeros((len(names), 3)), np.zeros(len(names))
         others = [np.random.default_rng((seed, _STREAM, i, _ERRORS)) for i in indices]
+        joints = config.joint_position, config.joint_velocity, config.joint_torque
+        imu_and_feet = config.gyro, config.accel, config.foot_force, config.orientation
+        self._sigma = np.repeat([*joints, *imu_and_feet], _SIZES)
+        self._bias, self._yaw_rate = np.zeros((n, _TURN.stop)), np.zeros(n)
         for i, (stream, other) in enumerate(zip(self._streams, others, strict=True)):
-            self._bias[i, _GYRO] = config.gyro_bias * stream.standard_normal(3)
-            self._bias[i, _ACCEL] = config.accel_bias * stream.standard_normal(3)
-            self._bias[i, _Q] = config.joint_offset * other.standard_normal(N_JOINTS)
-            self._tilt[i, :2] = config.orientation_bias * other.standard_normal(2)
+            bias = self._bias[i]
+            bias[_GYRO] = config.gyro_bias * stream.standard_normal(3)
+            bias[_ACCEL] = config.accel_bias * stream.standard_normal(3)
+            bias[_Q] = config.joint_offset * other.standard_normal(N_JOINTS)
+            bias[_TURN][:2] = config.orientation_bias * other.standard_normal(2)
             self._yaw_rate[i] = config.yaw_drift * other.standard_normal()
         self._kind = _FOOT_SENSORS[config.foot_sensor]
         self._feet = FootSensors(config, others)
         self._last = np.zeros((len(names), N_LEGS))  # what the feet's sensors read last
-
         self._next = _BLOCK  # row of the block that the next measurement takes
-        self._block, self._turns, self._unloaded = np.empty(0), np.empty(0), np.empty(0)
+        self._noise, self._turns, self._unloaded = np.empty(0), np.empty(0), np.empty(0)
         self._faults: Faults = np.empty(0, dtype=np.int8)
 
     def measure(self, tick: int, q: Array, v: Array, tau: Array, sensed: Array) -> dict[str, State]:
@@ -187,8 +166,8 @@ class Sensors:
         if self._next == _BLOCK:
             self._draw()
         rows, now = np.empty((len(q), _ROW)), self._next
-        _observe(q, v, tau, sensed, self._block[now], self._turns[now], rows)
-        _turn_about_vertical(self._yaw_rate * (1e-3 * tick), rows)
+        yaw = self._yaw_rate * (1e-3 * tick)
+        _observe(q, v, tau, sensed, self._noise[now], self._turns[now], yaw, rows)
         _convert_foot_forces(
             self._kind, self._feet.scale, self._unloaded[now], self._faults[now], self._last, rows
         )
@@ -197,45 +176,50 @@ class Sensors:
         return {name: State.from_row(tick, stamp_ns, rows[i]) for i, name in enumerate(self._names)}
 
     def _draw(self) -> None:
-        """Draw the next block: noise plus bias (_BLOCK, n, 46), and turns (_BLOCK, n, 4, 4)."""
+        """Draw the next block: noise plus bias, (_BLOCK, n, 49), and turns, (_BLOCK, n, 4).
+
+        A turn is the small rotation by a vector r in the trunk's frame, as the quaternion
+        (1, r/2), normalised: exact to third order in the angle.
+        """
         draws = [stream.standard_normal((_BLOCK, _TURN.stop)) for stream in self._streams]
-        noise = np.stack(draws, axis=1) * self._sigma
-        self._block = noise[:, :, :_SUMS] + self._bias
-        self._turns = turn_matrices(noise[:, :, _TURN] + self._tilt)
+        self._noise = np.stack(draws, axis=1) * self._sigma + self._bias
+        self._turns = np.ones((*self._noise.shape[:2], 4))
+        self._turns[..., 1:] = 0.5 * self._noise[..., _TURN]
+        self._turns /= np.linalg.norm(self._turns, axis=-1, keepdims=True)
         self._unloaded, self._faults = self._feet.draw(_BLOCK)
         self._next = 0
 
 
 @compiled
 def _observe(
-    q: Array, v: Array, tau: Array, sensed: Array, noise: Array, turns: Array, rows: Array
+    q: Array,
+    v: Array,
+    tau: Array,
+    sensed: Array,
+    noise: Array,
+    turns: Array,
+    yaw: Array,
+    rows: Array,
 ) -> None:
-    """Fill the rows of all robots' states."""
+    """Fill the rows of all robots' states; `yaw`, (n,), is the drift of their headings, rad."""
     for i in range(len(rows)):
         row, extra = rows[i], noise[i]
-        row[_STATE_Q] = extra[_Q] + q[i, JOINT_POSITIONS]
-        row[_STATE_V] = extra[_V] + v[i, JOINT_RATES]
-        row[_STATE_TAU] = extra[_TAU] + tau[i]
-        measured, attitude = row[_STATE_QUAT], q[i, ATTITUDE]
-        for a in range(4):
-            measured[a] = 0.0
-            for b in range(4):
-                measured[a] += turns[i, a, b] * attitude[b]
+        row[_Q] = extra[_Q] + q[i, JOINT_POSITIONS]
+        row[_V] = extra[_V] + v[i, JOINT_RATES]
+        row[_TAU] = extra[_TAU] + tau[i]
         row[_STATE_GYRO] = extra[_GYRO] + v[i, TRUNK_RATE]
         row[_STATE_ACCEL] = extra[_ACCEL] + sensed[i, SPECIFIC_FORCE]
-        feet, normal, noise_of_feet = row[_STATE_FOOT], sensed[i, FOOT_FORCES], extra[_FOOT]
-        for foot in range(N_LEGS):
-            feet[foot] = noise_of_feet[foot] + normal[foot]
-
-
-@compiled
-def _turn_about_vertical(angles: Array, rows: Array) -> None:
-    """Turn the attitudes in the states' rows by these angles, (n,), rad, about the world's z."""
-    for i in range(len(rows)):
-        quat, c, s = rows[i, _STATE_QUAT], np.cos(0.5 * angles[i]), np.sin(0.5 * angles[i])
-        w, x, y, z = quat[0], quat[1], quat[2], quat[3]
-        quat[0], quat[1] = c * w - s * z, c * x - s * y
-        quat[2], quat[3] = c * y + s * x, c * z + s * w
+        row[_STATE_FOOT] = extra[_FOOT] + sensed[i, FOOT_FORCES]
+        # The measured attitude is the drift about the world's z ⊗ the true one ⊗ the turn.
+        attitude, turn = q[i, ATTITUDE], turns[i]
+        a, b, c, d = attitude[0], attitude[1], attitude[2], attitude[3]
+        p, r, s, t = turn[0], turn[1], turn[2], turn[3]
+        w, x = p * a - r * b - s * c - t * d, r * a + p * b + t * c - s * d
+        y, z = s * a - t * b + p * c + r * d, t * a + s * b - r * c + p * d
+        cos, sin = np.cos(0.5 * yaw[i]), np.sin(0.5 * yaw[i])
+        quat = row[_STATE_QUAT]
+        quat[0], quat[1] = cos * w - sin * z, cos * x - sin * y
+        quat[2], quat[3] = cos * y + sin * x, cos * z + sin * w
 
 
 @compiled
@@ -244,13 +228,8 @@ def _convert_foot_forces(
 ) -> None:
     """Make of the noisy normal forces in the states' rows what the sensors say of them.
 
-    Args:
-        kind: what they measure.
-        scale: counts per N, (n, 4).
-        unloaded: counts without load, (n, 4).
-        faults: what each sensor does now, (n, 4).
-        last: what each read last, (n, 4); changed in place.
-        rows: of the states; the feet's forces change.
+    They have `scale` counts per N and some counts `unloaded`; `last`, what each read last, changes
+    in place. All are of shape (n, 4).
     """
     for i in range(len(rows)):
         feet = rows[i, _STATE_FOOT]
@@ -265,20 +244,3 @@ def _convert_foot_forces(
                     counts = np.rint(scale[i, foot] * feet[foot] + unloaded[i, foot])
                     last[i, foot] = min(_MOST, max(_LEAST, counts))
                 feet[foot] = 0.0 if fault == READS_ZERO else last[i, foot]
-
-
-def turn_matrices(rotation: Array) -> Array:
-    """Matrices Q with Q q = q ⊗ p for the small rotations p by `rotation` in the trunk's frame.
-
-    p = (1, r/2), normalised: exact to third order in the angle.
-
-    Args:
-        rotation: rotation vectors, shape (..., 3), rad.
-
-    Returns:
-        Shape (..., 4, 4), for quaternions wxyz.
-    """
-    p = np.concatenate([np.ones((*rotation.shape[:-1], 1)), 0.5 * rotation], axis=-1)
-    p /= np.linalg.norm(p, axis=-1, keepdims=True)
-    matrices: Array = _SIGN * p[..., _INDEX]
-    return matrices

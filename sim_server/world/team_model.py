@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from typing import Final
 
 import mujoco
@@ -11,18 +12,18 @@ import numpy as np
 
 from quadriga.shared.config.friction import friction_of_robots
 from quadriga.shared.config.sections import Config
+from quadriga.shared.config.terrains import TERRAINS
 from quadriga.shared.config.yokes import yoke_pairs
 from quadriga.shared.robots.colours import robot_rgb
 from quadriga.shared.robots.conventions import FOOT_FRAMES, GRAVITY, Array, robot_names
-from quadriga.sim_server.terrain.relief import NO_CONTACT
-from quadriga.sim_server.terrain.terrain import Terrain, build_terrain
+from quadriga.sim_server.terrain.terrain import NO_CONTACT, Terrain, add_plane, build_course
 from quadriga.sim_server.world.layout import JOINT_POSITIONS, NQ
 from quadriga.sim_server.world.robot_body import VISUAL_GROUP, RobotBody
 from quadriga.sim_server.world.scenario import Load, build_loads
 
 TIMESTEP: Final = 1e-3  # s, one tick
 
-_STREAM: Final = 7  # of the seed
+_TERRAIN, _PLACES = 1, 7  # streams of the seed
 _YOKE_SOLREF: Final = (0.02, 1.0)  # s, damping ratio
 _YOKE_SOLIMP: Final = (0.95, 0.99, 0.001, 0.5, 2.0)
 _YOKE_RGBA: Final = (0.85, 0.65, 0.13, 1.0)
@@ -36,26 +37,16 @@ class TeamModel:
 
     Robot i of this world owns `qpos[19 i : 19 (i + 1)]`, `qvel[18 i : 18 (i + 1)]` and
     `sensordata[22 i : 22 (i + 1)]`, see `layout`; yoke k is tendon k and equality row k.
-
-    Attributes:
-        model: the MuJoCo model.
-        robots: names of this world's robots, and their indices in the team.
-        terrain: the ground, for its height.
-        trunks: body id of each trunk, shape (n,).
-        yokes: the pairs of robot indices that are yoked.
-        rest_length: length of each yoke at the spawn, shape (k,), m.
-        payload: load on each robot of the team.
-        q_spawn: positions at the spawn, shape (19 n,); the terrain's bodies follow.
     """
 
     model: mujoco.MjModel
-    robots: Mapping[str, int]
-    terrain: Terrain
-    trunks: np.ndarray[tuple[int], np.dtype[np.intp]]
-    yokes: tuple[tuple[int, int], ...]
-    rest_length: Array
-    payload: tuple[Load, ...]
-    q_spawn: Array
+    robots: Mapping[str, int]  # names of this world's robots, and their indices in the team
+    terrain: Terrain  # the ground, for its height
+    trunks: np.ndarray[tuple[int], np.dtype[np.intp]]  # body id of each trunk, shape (n,)
+    yokes: tuple[tuple[int, int], ...]  # the pairs of robot indices that are yoked
+    rest_length: Array  # length of each yoke at the spawn, shape (k,), m
+    payload: tuple[Load, ...]  # load on each robot of the team
+    q_spawn: Array  # positions at the spawn, shape (19 n,); the terrain's bodies follow
 
 
 def formation(n: int, spacing: float) -> Array:
@@ -77,8 +68,23 @@ def spawn_positions(config: Config) -> Array:
     Each robot's draw is the same however many others there are.
     """
     places, reach = formation(config.team.robots, config.team.spacing), config.world.scatter
-    random = np.random.default_rng((config.world.seed, _STREAM))
+    random = np.random.default_rng((config.world.seed, _PLACES))
     return places + random.uniform(-reach, reach, places.shape)
+
+
+def build_terrain(config: Config) -> Terrain:
+    """The terrain of a configuration, drawn from `world.seed`; flat under the spawned team.
+
+    The flat place does not depend on where exactly the robots stand.
+    """
+    world, places = config.world, formation(config.team.robots, config.team.spacing)
+    if not world.uneven:
+        return Terrain()
+    module, _, function = TERRAINS[world.terrain].builder.partition(":")
+    build = getattr(import_module(f"quadriga.sim_server.terrain.{module}"), function)
+    random = np.random.default_rng((world.seed, _TERRAIN))
+    terrain: Terrain = build(build_course(config, places), world, random)
+    return terrain
 
 
 def build_team_model(
@@ -95,19 +101,18 @@ def build_team_model(
         ConfigError: the payload or `world.friction_of` names no robot, the reference's trace is no
             trace, or the robot's URDF is missing.
     """
-    team = robot_names(config.team.robots)
+    team, world, robot = robot_names(config.team.robots), config.world, config.robot
     robots = {name: i for i, name in enumerate(team) if not names or name in names}
     places, payload = spawn_positions(config).tolist(), build_loads(config)
-    # The flat place must not depend on where exactly the robots stand.
-    terrain = build_terrain(config, formation(len(team), config.team.spacing))
+    terrain = build_terrain(config)
     spec = mujoco.MjSpec()
     _set_physics(spec)
     _set_visuals(spec)
+    add_plane(spec, loose=terrain.loose)
     terrain.add_to(spec)
-    friction = friction_of_robots(config.world.friction_of, config.world.friction, team)
-    robot = config.robot
-    body = RobotBody(robot, config.motors, leg_collisions=config.world.leg_collisions)
-    lying = config.world.initial_posture == "lying"
+    friction = friction_of_robots(world.friction_of, world.friction, team)
+    body = RobotBody(robot, config.motors, leg_collisions=world.leg_collisions)
+    lying = world.initial_posture == "lying"
     height = robot.lying_height if lying else robot.stand_height
     for name, i in robots.items():
         place = (*places[i], height)
@@ -118,35 +123,28 @@ def build_team_model(
         if payload[i].mass > 0.0:
             _add_payload(trunk, f"{name}/payload", payload[i], robot.yoke)
         _add_sensors(spec, f"{name}/")
-    pairs = _pairs_within(robots, yoke_pairs(len(team), config.team.yokes))
-    for i, j in pairs:
+    here = {i: k for k, i in enumerate(robots.values())}
+    pairs = yoke_pairs(len(team), config.team.yokes)
+    yokes = tuple((here[i], here[j]) for i, j in pairs if i in here and j in here)
+    for i, j in yokes:
         _add_yoke(spec, *(list(robots)[k] for k in (i, j)))
-    terrain.relief.add_bodies(spec, len(robots), config.world.friction)
+    terrain.add_bodies(spec, len(robots), world.friction)
     if dress is not None:
         dress(spec)
     model = spec.compile()
     q_spawn = model.qpos0.copy()
-    q_spawn[: len(robots) * NQ].reshape(len(robots), NQ)[:, JOINT_POSITIONS] = (
-        robot.q_lying if lying else robot.q_stand
-    )
+    of_robots = q_spawn[: len(robots) * NQ].reshape(len(robots), NQ)
+    of_robots[:, JOINT_POSITIONS] = robot.q_lying if lying else robot.q_stand
     return TeamModel(
         model=model,
         robots=robots,
         terrain=terrain,
         trunks=np.array([model.body(f"{name}/trunk").id for name in robots]),
-        yokes=pairs,
+        yokes=yokes,
         rest_length=model.tendon_length0.copy(),
         payload=payload,
         q_spawn=q_spawn,
     )
-
-
-def _pairs_within(
-    robots: Mapping[str, int], pairs: Iterable[tuple[int, int]]
-) -> tuple[tuple[int, int], ...]:
-    """The pairs of which both robots are in this world, by their indices in it."""
-    here = {i: k for k, i in enumerate(robots.values())}
-    return tuple((here[i], here[j]) for i, j in pairs if i in here and j in here)
 
 
 def _set_physics(spec: mujoco.MjSpec) -> None:
@@ -190,20 +188,13 @@ def _add_sun(trunk: mujoco.MjsBody) -> None:
     )
 
 
-def _add_payload(
-    trunk: mujoco.MjsBody, name: str, load: Load, mount: tuple[float, float, float]
-) -> None:
+def _add_payload(trunk: mujoco.MjsBody, name: str, load: Load, mount: Sequence[float]) -> None:
     """A homogeneous box welded on top of the trunk, at `mount` if the load is not offset."""
-    x, y = load.offset
+    (x, y), size = load.offset, [length / 2 for length in _PAYLOAD_BOX]
     body = trunk.add_body(name=name, pos=(mount[0] + x, mount[1] + y, mount[2]))
-    body.add_geom(
-        type=mujoco.mjtGeom.mjGEOM_BOX,
-        size=[length / 2 for length in _PAYLOAD_BOX],
-        mass=load.mass,
-        rgba=_PAYLOAD_RGBA,
-        group=VISUAL_GROUP,
-        **NO_CONTACT,
-    )
+    look = {"rgba": _PAYLOAD_RGBA, "group": VISUAL_GROUP}
+    box = mujoco.mjtGeom.mjGEOM_BOX
+    body.add_geom(type=box, size=size, mass=load.mass, **look, **NO_CONTACT)
 
 
 def _add_yoke(spec: mujoco.MjSpec, first: str, second: str) -> None:
@@ -224,14 +215,12 @@ def _add_yoke(spec: mujoco.MjSpec, first: str, second: str) -> None:
 
 def _add_sensors(spec: mujoco.MjSpec, prefix: str) -> None:
     """The robot's block of `sensordata`, in the order of `layout`."""
-    site, geom = mujoco.mjtObj.mjOBJ_SITE, mujoco.mjtObj.mjOBJ_GEOM
-    kind = mujoco.mjtSensor
-    spec.add_sensor(type=kind.mjSENS_GYRO, objtype=site, objname=prefix + "imu")
-    spec.add_sensor(type=kind.mjSENS_ACCELEROMETER, objtype=site, objname=prefix + "imu")
+    site, geom, kind = mujoco.mjtObj.mjOBJ_SITE, mujoco.mjtObj.mjOBJ_GEOM, mujoco.mjtSensor
+    for of_imu in (kind.mjSENS_GYRO, kind.mjSENS_ACCELEROMETER):
+        spec.add_sensor(type=of_imu, objtype=site, objname=prefix + "imu")
     for foot in FOOT_FRAMES:
         spec.add_sensor(type=kind.mjSENS_TOUCH, objtype=site, objname=prefix + foot)
     for foot in FOOT_FRAMES:
         # intprm: which fields (bit 1: force), how contacts are reduced (3: net force), how many.
-        spec.add_sensor(
-            type=kind.mjSENS_CONTACT, objtype=geom, objname=prefix + foot, intprm=[2, 3, 1]
-        )
+        force = {"type": kind.mjSENS_CONTACT, "intprm": [2, 3, 1]}
+        spec.add_sensor(objtype=geom, objname=prefix + foot, **force)

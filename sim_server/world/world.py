@@ -17,7 +17,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.messages import Command, Event, State, Truth
 from quadriga.shared.robots.conventions import FOOT_FRAMES, N_JOINTS, N_LEGS, Array
-from quadriga.sim_server.terrain.relief import FOLLOW_MS
+from quadriga.sim_server.terrain.terrain import FOLLOW_MS
 from quadriga.sim_server.world import layout
 from quadriga.sim_server.world.faults import Injection, with_time
 from quadriga.sim_server.world.motors import Motors
@@ -73,16 +73,13 @@ class World(Plant):
         self._indices = list(self.team.robots.values())
         self.physics = mujoco.MjData(self.team.model)
         self._scenario = build_scenario(config, self.team.payload)
-        self._push_changes = self._scenario.changes()
-        self._weakenings = self._scenario.weakenings()
         self._injection = Injection(config, self.names)
         self._live_faults = config.world.live_faults
         announced = (*self._scenario.events, *self._injection.events)
-        events = [e for e in announced if e.robot in ("", *self.names)]
-        self._events = {
-            tick: tuple(event for event in events if event.tick == tick)
-            for tick in {event.tick for event in events}
-        }
+        self._events: dict[int, list[Event]] = {}
+        for event in announced:
+            if event.robot in ("", *self.names):
+                self._events.setdefault(event.tick, []).append(event)
         n = len(self.names)
         # Views of MuJoCo's own memory; behind the robots come the terrain's bodies.
         self._q = self.physics.qpos[: n * layout.NQ].reshape(n, layout.NQ)
@@ -110,9 +107,8 @@ class World(Plant):
         model = self.team.model
         feet = (f"{name}/{foot}" for name in self.names for foot in FOOT_FRAMES)
         self._feet = [model.geom(foot).id for foot in feet]
-        self._moving = self.team.terrain.relief.start(
-            model, self.physics, n, config.robot.geometry.foot_radius
-        )
+        radius = config.robot.geometry.foot_radius
+        self._moving = self.team.terrain.start(model, self.physics, n, radius)
         self._settled, self._unstable = True, self.physics.warning.number[_UNSTABLE]
         self._yoke_force = self._read_yoke_force()
         self._states = self._measure()
@@ -127,12 +123,11 @@ class World(Plant):
         The motors follow the commands as `motors` tells, a weak one with its share of the torque.
         Those of a robot without a command damp its joints, see `quadriga.plant.commands`.
         """
-        events = list(self._events.get(self.tick, ()))
-        if self.tick in self._push_changes:
-            forces = self._scenario.forces(self.tick)
+        events = self._events.get(self.tick, ())
+        if (forces := self._scenario.forces.get(self.tick)) is not None:
             self.physics.xfrc_applied[self.team.trunks, :3] = forces[self._indices]
-        if self.tick in self._weakenings:
-            self._strength = self._scenario.strength(self.tick)[self._indices]
+        if (strength := self._scenario.strength.get(self.tick)) is not None:
+            self._strength = strength[self._indices]
         rows = [commands.get(name, _DAMPED).row for name in self.names]
         rows = self._injection.distort_commands(self.tick, rows)
         self.motors.drive(self.motors.send(rows), self._q, self._v, self._strength)
@@ -193,7 +188,7 @@ class World(Plant):
         """
         added = self._injection.add(fault)
         for event in added:
-            self._events[event.tick] = (*self._events.get(event.tick, ()), event)
+            self._events.setdefault(event.tick, []).append(event)
         return tuple(Event.of(self.tick, FAULT_ASKED, e.robot, fault) for e in added[:1])
 
     def fallen(self) -> tuple[str, ...]:

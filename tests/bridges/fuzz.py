@@ -1,7 +1,7 @@
-"""Packets of every kind of damage through a robot's driver and its supervisor.
+"""Packets of every kind of damage through a bridge's driver and its supervisor.
 
-`python -m tests.bridges.fuzz` sends a million of them over real sockets and prints what became of
-them. No packet may raise an exception, and no command that leaves may hold a torque beyond limits.
+`python -m tests.bridges.fuzz` makes a million of them and prints what became of them. No packet may
+raise an exception, and no command that leaves may hold a torque beyond limits.
 """
 
 from __future__ import annotations
@@ -9,14 +9,13 @@ from __future__ import annotations
 import argparse
 import sys
 from collections import Counter
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import replace
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
-from quadriga.bridges.drivers import UdpDriver
+from quadriga.bridges.drivers import RobotDriver
 from quadriga.bridges.limits import joint_limits, shares_of_speed
 from quadriga.bridges.plant import to_state
 from quadriga.bridges.supervisor import (
@@ -28,15 +27,12 @@ from quadriga.bridges.supervisor import (
 )
 from quadriga.plant.commands import MOST_KD, MOST_KP
 from quadriga.shared.codec import decode, encode
-from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
 from quadriga.shared.messages import Command
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.unitree.codecs import CODECS, GO2, Codec, seal
-from quadriga.shared.unitree.packets import PacketError, RobotReport
-from quadriga.shared.unitree.udp import Address, UdpPort
+from quadriga.shared.unitree.packets import SERVO, MotorTargets, RobotReport
 from tests.bridges.robots import config_of, standing
-from tests.bridges.test_udp_driver import HOST, free_port
 
 KINDS: Final = ("a1", "go1", "go2")
 _BEGINNINGS: Final = (BridgeMode.PASSIVE, BridgeMode.STAND, BridgeMode.WALK)
@@ -47,72 +43,22 @@ _EXTREMES: Final = np.array(
 )
 
 
-class Link(NamedTuple):
-    """What a fuzzed robot and its bridge have between them.
+class FuzzedDriver(RobotDriver):
+    """A driver without a network: `arrived` has come from the robot, `sent` goes to it."""
 
-    Attributes:
-        codec: of its packets.
-        send: has the robot send bytes.
-        receive: the bridge's newest report.
-        command: sends a command.
-        arrived: commands that reached the robot, as bytes.
-    """
+    servo, packets_ms = SERVO, 1
 
-    codec: Codec
-    send: Callable[[bytes], None]
-    receive: Callable[[], RobotReport | None]
-    command: Callable[..., None]
-    arrived: Callable[[], list[bytes]]
+    def __init__(self, codec: Codec) -> None:
+        super().__init__()
+        self.codec, self.arrived, self.sent = codec, b"", b""
 
+    def receive(self) -> RobotReport | None:
+        return self._read(self.codec, self.arrived)
 
-@contextmanager
-def link_to(kind: str, config: Config) -> Iterator[Link]:
-    """A1 and Go1: the bridge's driver and a robot's port. Go2: its packets without the network."""
-    if kind == "go2":
-        yield _go2_link()
-        return
-    here, bridge = Address(HOST, free_port()), Address(HOST, free_port())
-    robot = UdpPort(here)
-    ends = {"endpoint": f"{HOST}:{here.port}", "listen": f"{HOST}:{bridge.port}"}
-    driver = UdpDriver(kind, config_of(kind, **ends).bridge)
-    try:
-        yield Link(
-            CODECS[kind],
-            lambda packet: _sent(robot.send(packet, bridge)),
-            driver.receive,
-            driver.send,
-            lambda: [packet for packet, _ in robot.drain()],
-        )
-    finally:
-        robot.close()
-        driver.close()
+    def send(self, targets: MotorTargets) -> None:
+        self.sent = self.codec.encode_command(targets)
 
-
-def _sent(arrived: bool) -> None:
-    if not arrived:
-        raise OSError("a packet did not fit into the loopback")
-
-
-def _go2_link() -> Link:
-    reports, commands = list[bytes](), list[bytes]()
-
-    def receive() -> RobotReport | None:
-        newest = None
-        while reports:
-            try:
-                newest = GO2.decode_report(reports.pop(0))
-            except PacketError:
-                continue
-        return newest
-
-    def arrived() -> list[bytes]:
-        taken = commands.copy()
-        commands.clear()
-        return taken
-
-    return Link(
-        GO2, reports.append, receive, lambda t: commands.append(GO2.encode_command(t)), arrived
-    )
+    def close(self) -> None: ...
 
 
 class Damage:
@@ -121,12 +67,10 @@ class Damage:
     Args:
         good: the packet.
         seed: of the damage.
-        counter: where in it the robot counts; None if nobody looks at that.
     """
 
-    def __init__(self, good: bytes, seed: int, counter: int | None = None) -> None:
+    def __init__(self, good: bytes, seed: int) -> None:
         self._good, self._random = np.frombuffer(good, np.uint8), np.random.default_rng(seed)
-        self._counter, self._made = counter, 0
 
     def packet(self) -> bytes:
         """The next one."""
@@ -146,10 +90,6 @@ class Damage:
         elif kind == 4:
             for at in where:
                 packet[at : at + 4] = np.frombuffer(random.choice(_EXTREMES).tobytes(), np.uint8)
-        self._made += 1
-        if self._counter is not None:  # else a driver takes it for one that it has had
-            count = np.frombuffer(self._made.to_bytes(4, "little"), np.uint8)
-            packet[self._counter : self._counter + 4] = count
         return seal(packet.tobytes())
 
 
@@ -160,15 +100,13 @@ class Fuzz:
         counts: packets and commands by what became of them.
     """
 
-    def __init__(self, kind: str, seed: int, link: Link, config: Config) -> None:
-        self._link = link
+    def __init__(self, kind: str, seed: int) -> None:
+        config, self._driver = config_of(kind), FuzzedDriver(CODECS.get(kind, GO2))
         self._random = np.random.default_rng([seed, 1])
-        self._supervisor = Supervisor(config.robot, config.bridge, servo=10)
+        self._supervisor = Supervisor(config.robot, config.bridge, SERVO)
         self._limits = joint_limits(config.bridge, config.robot)
         report = self._good = standing(config)
-        layout = None if kind == "go2" else CODECS[kind].report
-        counter = None if layout is None or layout.fields is None else layout.fields["tick"][1]
-        self._damage = Damage(link.codec.encode_report(report), seed, counter)
+        self._damage = Damage(self._driver.codec.encode_report(report), seed)
         good = np.stack([np.zeros(12), config.robot.q_stand, *np.ones((3, 12))])
         self._command: Command | None = None
         self._agent = Damage(encode(Command(1, 0, *good)), seed + 1)
@@ -181,9 +119,8 @@ class Fuzz:
         passive = self._supervisor.initial(now, armed=True)
         state = replace(passive, mode=_BEGINNINGS[self._random.integers(len(_BEGINNINGS))])
         request = list(Request)[self._random.integers(len(Request))]
-        return self._supervisor.step(state, SupervisorInputs(now, self._good, 0, request=request))[
-            0
-        ]
+        inputs = SupervisorInputs(now, self._good, 0, request=request)
+        return self._supervisor.step(state, inputs)[0]
 
     def run(self, packets: int) -> None:
         """Send packets.
@@ -197,8 +134,8 @@ class Fuzz:
             self._turn(now)
 
     def _turn(self, now: int) -> None:
-        self._link.send(self._damage.packet())
-        report = self._link.receive()
+        self._driver.arrived = self._damage.packet()
+        report = self._driver.receive()
         self._age = 0 if report is not None else self._age + 1
         if report is not None:
             self._report = report
@@ -218,14 +155,13 @@ class Fuzz:
         self._state, supervised = self._supervisor.step(self._state, inputs)
         self.counts[str(self._state.mode)] += 1
         if supervised.targets is not None:
-            self._link.command(supervised.targets)
-        for packet in self._link.arrived():
-            self._check(packet)
+            self._driver.send(supervised.targets)
+            self._check(self._driver.sent)
 
     def _check(self, packet: bytes) -> None:
         """What arrives at the robot holds numbers, gains, and torques within the limits."""
         self.counts["commands"] += 1
-        targets, limits = self._link.codec.decode_command(packet), self._limits
+        targets, limits = self._driver.codec.decode_command(packet), self._limits
         assert (np.abs(targets.tau) <= limits.torque + 0.01).all(), targets
         assert ((targets.kp >= 0.0) & (targets.kp <= MOST_KP)).all(), targets
         assert ((targets.kd >= 0.0) & (targets.kd <= MOST_KD)).all(), targets
@@ -249,9 +185,8 @@ def fuzz(kind: str, packets: int, seed: int) -> Counter[str]:
     Raises:
         AssertionError: a command that left is beyond the limits.
     """
-    config = config_of(kind)
-    with link_to(kind, config) as link, np.errstate(all="ignore"):  # numbers that are none
-        robot = Fuzz(kind, seed, link, config)
+    with np.errstate(all="ignore"):  # numbers that are none
+        robot = Fuzz(kind, seed)
         robot.run(packets)
     return robot.counts
 

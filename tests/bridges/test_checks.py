@@ -78,7 +78,7 @@ def test_too_few_reports_or_always_the_same_are_named() -> None:
 
 
 @pytest.mark.parametrize("kind", list(ROBOTS))
-@pytest.mark.parametrize("joint", [2, 5, 8, 11])
+@pytest.mark.parametrize("joint", [2, 11])
 @pytest.mark.parametrize("off", [0.69, -0.69])  # rad: a turn of the motor behind its gear
 def test_an_uncalibrated_calf_is_refused(kind: str, joint: int, off: float) -> None:
     wrong = config_of(kind).robot.q_lying + off * (np.arange(12) == joint)
@@ -88,33 +88,10 @@ def test_an_uncalibrated_calf_is_refused(kind: str, joint: int, off: float) -> N
     assert "zero" in caught.value.cause
 
 
-def test_the_messages_of_what_is_refused() -> None:
-    calf = np.where(np.arange(12) == 2, 0.4, config_of().robot.q_lying)
-    refused = {
-        "robot r1: joint angles: got FL_calf_joint 0.40 rad, expected the joints of the Unitree "
-        "A1 (another kind of robot, or a joint whose zero is wrong: calibrate it)": {"q": calf},
-        "robot r1: posture: got tilted by 3.10 rad, expected at most 0.6 rad "
-        "(lay it on its feet on level ground)": {
-            "quat_wxyz": tilted(3.1),
-            "accel": np.array([0.0, 0.0, -9.81]),
-        },
-    }
-    for message, fields in refused.items():
-        with pytest.raises(CheckError) as caught:
-            refuse_failed("r1", list(check(lying(**fields)).values()))
-        assert str(caught.value) == message
-
-
-def test_a_robot_that_hangs_may_have_its_feet_anywhere() -> None:
-    config, reports = config_of(), lying(q=ONE_LEG_STRAIGHT)
-    findings = check_reports(reports, 1.0, 1, config.bridge, config.robot, hung=True)
-    refuse_failed("r1", findings)
-    assert "legs" not in {finding.name for finding in findings}
-
-
-def test_packets_count_and_not_how_often_a_busy_computer_looked() -> None:
-    config = config_of("a1")
-    reports = lying("a1")[::4]
-    seldom = check_reports(reports, 1.0, 1, config.bridge, config.robot)
-    assert [finding.name for finding in seldom if not finding.ok] == ["reports"]
-    refuse_failed("r1", check_reports(reports, 1.0, 1, config.bridge, config.robot, received=1000))
+def test_what_hangs_may_have_its_feet_anywhere_and_all_packets_that_came_count() -> None:
+    config = config_of()
+    limits = 1.0, 1, config.bridge, config.robot
+    refuse_failed("r1", check_reports(lying(q=ONE_LEG_STRAIGHT), *limits, hung=True))
+    few = lying()[::4]
+    assert [f.name for f in check_reports(few, *limits) if not f.ok] == ["reports"]
+    refuse_failed("r1", check_reports(few, *limits, received=1000))

@@ -123,9 +123,7 @@ def test_a_sound_robot_passes_and_is_passive_at_the_end() -> None:
     assert [v.joint for v in sound.verdicts] == list(JOINT_NAMES)
     assert all(abs(v.moved - v.asked) < 0.3 * WAY for v in sound.verdicts)
     assert sound.torque <= TORQUE
-    lines = table(sound.verdicts).splitlines()
-    assert len(lines) == 2 + 12
-    assert all(line.endswith("right") for line in lines[2:])
+    assert all(line.endswith("right") for line in table(sound.verdicts).splitlines()[2:])
 
 
 PLANTED: dict[str, tuple[Commands, Reports, str]] = {

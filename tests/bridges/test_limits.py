@@ -100,13 +100,8 @@ def test_a_joint_at_its_end_is_pushed_no_further(end: str, push: float) -> None:
     limited = limit_targets(free, JointReading(q, np.zeros(12)), np.zeros(12), 1, LIMITS)
     np.testing.assert_array_equal(limited.torque, 0.0)
     assert "end-stop" in limited.cut
-    back = limit_targets(
-        replace(free, tau=np.full(12, -push)),
-        JointReading(q, np.zeros(12)),
-        np.zeros(12),
-        1,
-        LIMITS,
-    )
+    away = replace(free, tau=np.full(12, -push))
+    back = limit_targets(away, JointReading(q, np.zeros(12)), np.zeros(12), 1, LIMITS)
     np.testing.assert_allclose(back.torque, -push)
 
 

@@ -20,6 +20,8 @@ def test_from_any_posture_to_the_stand_and_down(kind: str, share: float, at: flo
     lower, upper = np.array(config.robot.lower), np.array(config.robot.upper)
     q = lower + share * (upper - lower)
     limits = joint_limits(config.bridge, config.robot)
+    assert (config.robot.q_lying >= limits.lower).all()
+    assert (config.robot.q_lying <= limits.upper).all()
     seconds = config.bridge.stand_s
     up, down = way_up(q, config.robot, seconds), way_down(q, config.robot, seconds)
     for motion, end in ((up, config.robot.q_stand), (down, config.robot.q_lying)):
@@ -43,12 +45,3 @@ def test_the_rate_is_that_of_the_angle() -> None:
         np.testing.assert_allclose(
             (after - before) / 2e-5, posture_at(motion, seconds)[1], atol=1e-3
         )
-
-
-@pytest.mark.parametrize("kind", list(ROBOTS))
-def test_a_robot_lies_within_its_limits(kind: str) -> None:
-    config = config_of(kind)
-    limits = joint_limits(config.bridge, config.robot)
-    assert (config.robot.q_lying >= limits.lower).all()
-    assert (config.robot.q_lying <= limits.upper).all()
-    assert 0.05 < config.robot.lying_height < 0.6 * config.robot.stand_height

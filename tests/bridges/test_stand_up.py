@@ -2,10 +2,86 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
 import pytest
 
-from quadriga.bridges.supervisor import BridgeMode, Request
-from tests.bridges.dropped import Robot, random_angles
+from quadriga.bridges.supervisor import BridgeMode, Request, Supervisor, SupervisorInputs, tilt_of
+from quadriga.shared.config.load import load
+from quadriga.shared.robots.conventions import Array
+from quadriga.shared.robots.registry import ROBOTS
+from quadriga.shared.unitree.packets import SERVO
+from quadriga.sim_server.emulator.robot_emulator import RobotStatus
+from quadriga.sim_server.world.world import World
+from tests.bridges.robots import holding
+
+
+class Moment(NamedTuple):
+    """One tick: the bridge's mode, height and vertical speed of the trunk, and its tilt."""
+
+    mode: BridgeMode
+    height: float
+    falling: float
+    tilt: float
+
+
+class Robot:
+    """One simulated robot under its supervisor, without a network."""
+
+    def __init__(self, kind: str) -> None:
+        self.config = load(overrides={"team.robot": kind, "team.robots": 1})
+        self.world = World(self.config)
+        self._supervisor = Supervisor(self.config.robot, self.config.bridge, SERVO)
+        self.state = self._supervisor.initial(0, armed=True)
+        self._status = RobotStatus()
+        self._on = holding(self.config)
+        self.torque = 0.0
+
+    def drop(self, q: Array) -> None:
+        """Let it fall, passive, from joint angles at which it touches nothing, and come to rest."""
+        physics, model = self.world.physics, self.world.team.model
+        physics.qpos[2], physics.qpos[7:] = 0.5, q
+        physics.qvel[:] = 0.0
+        mujoco.mj_forward(model, physics)
+        legs = [geom for geom in range(model.ngeom) if model.geom_bodyid[geom]]
+        physics.qpos[2] -= min(physics.geom_xpos[geom][2] for geom in legs) - 0.05
+        mujoco.mj_forward(model, physics)
+        for _ in range(800):
+            self.world.step({})
+
+    def do(self, request: Request, end: BridgeMode) -> Iterator[Moment]:
+        """Tick by tick, until the bridge is in the mode `end`, or has stopped."""
+        for _ in range(15_000):
+            tick = self.world.tick
+            state, heat = self.world.states()["r1"], self.world.motors.heat[0]
+            report = self._status.report(state, heat, self._on)
+            inputs = SupervisorInputs(now=tick, report=report, report_age=0, request=request)
+            self.state, supervised = self._supervisor.step(self.state, inputs)
+            if self.state.mode in (end, BridgeMode.ESTOP):
+                return
+            command = self._status.command(supervised.targets)
+            self.world.step({} if command is None else {"r1": command})
+            share = np.abs(self.world.motors.torque[0]) / self.config.robot.torque_limit
+            self.torque = max(self.torque, float(share.max()))
+            physics = self.world.physics
+            quat = physics.qpos[3:7]
+            yield Moment(
+                self.state.mode, float(physics.qpos[2]), -float(physics.qvel[2]), tilt_of(quat)
+            )
+
+    def stand(self) -> list[Moment]:
+        return list(self.do(Request.STAND, BridgeMode.STAND))
+
+
+def random_angles(kind: str, seed: int) -> Array:
+    robot = ROBOTS[kind]
+    lower, upper = np.array(robot.lower) + 0.03, np.array(robot.upper) - 0.03
+    share = np.random.default_rng(seed).uniform(size=12)
+    angles: Array = lower + share * (upper - lower)
+    return angles
 
 
 @pytest.mark.parametrize(("kind", "seed"), [("a1", 104), ("go1", 101), ("go2", 103)])

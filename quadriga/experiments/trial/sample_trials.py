@@ -38,7 +38,7 @@ _TRIALS: Final[tuple[dict[str, Any], ...]] = (
     },
     _NONE | {
         "team.robots": 2, "world.terrain": "slope", "world.slope": 10.0, "world.friction": 0.35,
-        "world.weak_motor": "r1:FL_calf:0.3,any:any:0.5", "world.weak_share": 0.6,
+        "world.motor_strength": "r1:FL_calf:0.3,any:any:0.5:0.6",
     },
     _NONE | _SHORT | {"team.robots": 1, "world.terrain": "pebbles", "world.terrain_height": 0.02},
     _NONE | _SHORT | {"team.robots": 1, "world.terrain": "gravel", "controller.preset": "plain"},

@@ -31,7 +31,7 @@ class Radio:
     def __init__(self, hosts: Mapping[int, str], seed: int) -> None:
         self._hosts = hosts
         self._ways = {
-            (sender, receiver): Link((seed, number), keeps_size=True)
+            (sender, receiver): Link((seed, number))
             for number, (sender, receiver) in enumerate(permutations(hosts.values(), 2))
         }
         self._heals: dict[str, float] = {}  # when the radio of a place is whole again, ms

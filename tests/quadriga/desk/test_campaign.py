@@ -19,8 +19,8 @@ from quadriga.shared.errors import ConfigError
 from quadriga.shared.runtime.places import SOURCE
 from quadriga.shared.unitree.codecs import A1
 from quadriga.shared.unitree.udp import Address
-from quadriga.sim_server.emulator.board import UdpBoard
 from quadriga.sim_server.emulator.process import execute
+from quadriga.sim_server.emulator.robot_emulator import UdpEmulator
 from quadriga.tables import Table
 from quadriga.team.trial_rows import ROWS, keep_config, read_rows
 from tests.bridges.test_udp_driver import HOST, free_port
@@ -40,10 +40,10 @@ def test_faults_by_name_in_the_order_of_the_table() -> None:
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
 def test_every_fault_is_one_that_the_desk_understands(fault: Any) -> None:
     assert fault.orders or fault.processes
-    board = UdpBoard(A1, Address(HOST, free_port()))
+    robot = UdpEmulator(A1, Address(HOST, free_port()))
     for order in fault.orders:
-        assert execute(f"r2 {order}", {"r2": board}) == f"r2 {order}"
-    board.close()
+        assert execute(f"r2 {order}", {"r2": robot}) == f"r2 {order}"
+    robot.close()
 
 
 def row(fault: str, seed: int, **fields: Any) -> dict[str, Any]:

@@ -46,7 +46,7 @@ def test_loose_stones_and_weak_motors_come_out_equal(
 ) -> None:
     scene = config(
         world__terrain="pebbles",
-        world__weak_motor="r1:any:0.05,r2:calf:0",
+        world__motor_strength="r1:any:0.05,r2:calf:0",
         world__push_force=60.0,
         world__push_every=0.1,
     )

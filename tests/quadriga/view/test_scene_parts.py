@@ -56,18 +56,18 @@ def test_a_surface_follows_the_heights() -> None:
 
 
 def test_loose_stones_around_the_team_are_shown_wherever_it_goes() -> None:
-    relief = terrain("pebbles").relief
+    pebbles = terrain("pebbles")
     with open_server(PageAddress(0), "stones") as server:
-        layer = StoneLayer(server.scene, relief)
+        layer = StoneLayer(server.scene, pebbles)
         batch = layer._batch
         assert batch is not None
         for x in (0.0, 0.1, 2.0):
             layer.follow(np.array([x, 0.2]))
-            near = relief.stones_near(np.array([x, 0.2]) if x > 1.0 else np.zeros(2), 6000)
+            near = pebbles.stones_near(np.array([x, 0.2]) if x > 1.0 else np.zeros(2), 6000)
             assert batch.batched_positions == pytest.approx(near.poses[:, :3], abs=1e-6)
             assert batch.batched_scales == pytest.approx(near.halves, abs=1e-6)
         assert len(near.poses) > 500
-        assert StoneLayer(server.scene, terrain("boxes").relief)._batch is None
+        assert StoneLayer(server.scene, terrain("boxes"))._batch is None
 
 
 @pytest.mark.parametrize("kind", ["a1", "go2"])

@@ -19,7 +19,6 @@ from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.unitree.codecs import A1
 from quadriga.shared.unitree.packets import pressed_buttons
 from quadriga.shared.unitree.udp import Address
-from quadriga.sim_server.emulator.board import Board, UdpBoard
 from quadriga.sim_server.emulator.link import LinkFaults
 from quadriga.sim_server.emulator.process import (
     DAMPED,
@@ -33,6 +32,7 @@ from quadriga.sim_server.emulator.process import (
     execute,
     read_lines,
 )
+from quadriga.sim_server.emulator.robot_emulator import RobotEmulator, UdpEmulator
 from quadriga.sim_server.world.world import World
 from tests.bridges.test_udp_driver import HOST, free_port
 
@@ -41,45 +41,49 @@ ZERO, ONES = np.zeros(12), np.ones(12)
 
 
 @pytest.fixture
-def boards() -> Iterator[dict[str, Board]]:
-    made: dict[str, Board] = {n: UdpBoard(A1, Address(HOST, free_port())) for n in ("r1", "r2")}
+def robots() -> Iterator[dict[str, RobotEmulator]]:
+    made: dict[str, RobotEmulator] = {
+        n: UdpEmulator(A1, Address(HOST, free_port())) for n in ("r1", "r2")
+    }
     yield made
-    for board in made.values():
-        board.close()
+    for robot in made.values():
+        robot.close()
 
 
-def test_each_command_does_what_it_says(boards: dict[str, Board]) -> None:
+def test_each_command_does_what_it_says(robots: dict[str, RobotEmulator]) -> None:
     lines = [f"all {word} 0.5" for word in ("loss", "duplicate", "reorder", "garbage", "delay")]
     lines += ["r1 remote L2+B", "r1 battery 8", "r1 protect FR_calf_joint", "r1 writer"]
-    assert [execute(line, boards) for line in lines] == lines
-    for board in boards.values():
-        assert board.inwards.faults == board.outwards.faults == LinkFaults(0.5, 0.5, 0.5, 0.5, 0.5)
-    status = boards["r1"].status
+    assert [execute(line, robots) for line in lines] == lines
+    for robot in robots.values():
+        assert robot.inwards.faults == robot.outwards.faults == LinkFaults(0.5, 0.5, 0.5, 0.5, 0.5)
+    status = robots["r1"].status
     assert pressed_buttons(status.remote) == {"L2", "B"}
     assert (status.charge, status.protected) == (8.0, {JOINT_NAMES.index("FR_calf_joint")})
-    assert boards["r2"].status.charge == 80.0
-    assert boards["r1"]._second_writer is not None
-    execute("all clear", boards)
-    assert boards["r1"].inwards.faults == LinkFaults()
-    assert boards["r1"]._second_writer is None
+    assert robots["r2"].status.charge == 80.0
+    assert robots["r1"]._second_writer is not None
+    execute("all clear", robots)
+    assert robots["r1"].inwards.faults == LinkFaults()
+    assert robots["r1"]._second_writer is None
 
 
-@pytest.mark.parametrize(
-    "line",
-    [
-        "",
-        "r1",
-        "r3 clear",
-        "r1 explode",
-        "r1 loss",
-        "r1 loss much",
-        "r1 remote L9",
-        "r1 battery 1 2",
-    ],
-)
-def test_a_wrong_line_is_answered_and_changes_nothing(boards: dict[str, Board], line: str) -> None:
-    assert execute(line, boards).startswith(f"command: got {line!r}, expected")
-    assert boards["r1"].inwards.faults == LinkFaults()
+WRONG = [
+    "",
+    "r1",
+    "r3 clear",
+    "r1 explode",
+    "r1 loss",
+    "r1 loss much",
+    "r1 remote L9",
+    "r1 clear 1 2",
+]
+
+
+@pytest.mark.parametrize("line", WRONG)
+def test_a_wrong_line_is_answered_and_changes_nothing(
+    robots: dict[str, RobotEmulator], line: str
+) -> None:
+    assert execute(line, robots).startswith(f"command: got {line!r}, expected")
+    assert robots["r1"].inwards.faults == LinkFaults()
 
 
 def test_lines_come_whole_however_they_are_cut() -> None:
@@ -89,9 +93,8 @@ def test_lines_come_whole_however_they_are_cut() -> None:
         os.write(into, part)
         got += read_lines(out, rest)
     os.close(into)
-    assert read_lines(out, rest) == []
     os.close(out)
-    assert got == ["r1 loss 0.1", "r2 clear", "�"]
+    assert got == ["r1 loss 0.1", "r2 clear", "\ufffd"]
 
 
 def motion(tau: Array = ZERO, kp: Array = ZERO, kd: Array = ZERO) -> Command:
@@ -126,7 +129,7 @@ def test_what_lasts_is_told_with_the_tick_at_which_it_began() -> None:
     events, told = MotorEvents(), list[tuple[int, str]]()
     doings = [MOTORS_OFF] * 30 + [DRIVEN] * 100 + [DAMPED, DRIVEN] * 50 + [DAMPED] * 100
     for now, doing in enumerate(doings):
-        if (since := events.note(now, doing)) is not None:
+        if (since := events.update(now, doing)) is not None:
             told.append((since, doing))
             assert now == since + LASTS_MS
     assert told == [(30, DRIVEN), (230, DAMPED)]
@@ -141,21 +144,18 @@ def test_a_robot_that_hangs_stays_level_and_in_place_while_its_legs_move(kind: s
     harness = Harness(world)
     place = world.truth().base_pos.copy()
     np.testing.assert_allclose(place[:, 2], HUNG_HEIGHT)
-    for tick in range(1000):
+    for tick in range(2000):
         swing = 0.3 * np.sin(2 * np.pi * 1.5e-3 * tick)
-        command = Command(0, 0, ZERO, stand + swing, ZERO, 60.0 * ONES, 2.0 * ONES)
+        swings = Command(0, 0, ZERO, stand + swing, ZERO, 60.0 * ONES, 2.0 * ONES)
+        damped = motion(kd=5.0 * ONES)
+        world.step(dict.fromkeys(world.names, swings if tick < 1000 else damped))
+        state = world.states()["r1"]
+        assert np.abs(state.imu_gyro).max() < 1.0, "as calm as a test of joints wants it"
         harness.hold()
-        world.step(dict.fromkeys(world.names, command))
         truth = world.truth()
-        assert np.abs(truth.base_pos - place).max() < 0.02
-        assert np.abs(truth.base_quat_wxyz[:, 1:]).max() < 0.05  # halves of the angles
-    assert not truth.grf.any(), "its feet are off the ground"
-    for _ in range(1000):
-        harness.hold()
-        world.step(dict.fromkeys(world.names, motion(kd=5.0 * ONES)))
-    assert np.abs(world.truth().base_vel).max() < 0.02
-    force = world.states()["r1"].imu_accel
-    assert np.linalg.norm(force) == pytest.approx(9.81, abs=0.5)
+        assert np.abs(truth.base_pos - place).max() < 1e-9
+        assert not truth.grf.any(), "its feet are off the ground"
+    assert np.linalg.norm(state.imu_accel) == pytest.approx(9.81, abs=0.5)
 
 
 def wait_for(words: str, file: Path) -> None:

@@ -17,14 +17,14 @@ from tests.sim_server.standing import configured, shift, stand
 
 def strewn(robots: int = 1, **world: object) -> World:
     """A world whose team hangs just above the stones."""
-    keys = {"terrain": "pebbles", "terrain_height": 0.02, "seconds": 8.0} | world
+    keys = {"terrain": "pebbles", "terrain_height": 0.02, "duration": 8.0} | world
     made = World(configured(robots, **keys))  # type: ignore[arg-type]
     shift(made, dx=3.0, dz=0.03)
     return made
 
 
 def parts(world: World) -> tuple[Pebbles, LooseStones]:
-    pebbles, stones = world.team.terrain.relief, world._moving
+    pebbles, stones = world.team.terrain, world._moving
     assert isinstance(pebbles, Pebbles)
     assert isinstance(stones, LooseStones)
     return pebbles, stones
@@ -54,9 +54,14 @@ def test_stones_cover_the_way_and_do_not_overlap() -> None:
     assert not flat.any()
 
 
-def test_a_team_on_stones_is_carried_by_them() -> None:
-    world = strewn()
-    stand(world, 600)
+def test_a_team_on_stones_is_carried_by_them_and_equal_seeds_give_equal_bytes() -> None:
+    world, again, other = strewn(), strewn(), strewn(seed=4)
+    for each in (world, again, other):
+        stand(each, 600)
+    assert encode(world.truth()) == encode(again.truth()) != encode(other.truth())
+    team = strewn(3)
+    stand(team, 400)
+    assert parts(team)[1].without == 0, "there is a body for every stone that a foot comes near"
     truth, (pebbles, stones) = world.truth(), parts(world)
     assert world.fallen() == ()
     assert truth.grf[:, :, 2].sum() == pytest.approx(TOTAL_MASS * GRAVITY, rel=0.02)
@@ -95,12 +100,6 @@ def test_stones_are_left_where_they_lie_and_found_there_again() -> None:
     np.testing.assert_array_equal(stones._q, before)  # … and do not fall
 
 
-def test_there_is_a_body_for_every_stone_that_a_foot_comes_near() -> None:
-    world = strewn(3)
-    stand(world, 400)
-    assert parts(world)[1].without == 0
-
-
 def test_friction_and_stiffness_are_those_of_the_stones() -> None:
     world = strewn(friction=0.35)
     stand(world, 300)
@@ -113,16 +112,6 @@ def test_friction_and_stiffness_are_those_of_the_stones() -> None:
     assert (stone & feet).any()
     kinds = world.team.model.geom_type[contact.geom[stone & ~feet]]
     assert (kinds == mujoco.mjtGeom.mjGEOM_ELLIPSOID).any(axis=1).all()
-
-
-def test_equal_seeds_give_equal_stones_and_bytes() -> None:
-    def walked(seed: int) -> tuple[bytes, bytes]:
-        world = strewn(seed=seed, push="r1:60:90:0.1:0.2")
-        stand(world, 300)
-        return encode(world.truth()), places(parts(world)[1]).tobytes()
-
-    assert walked(3) == walked(3)
-    assert walked(3)[0] != walked(4)[0]
 
 
 @pytest.mark.parametrize("room", [5000, 40])

@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quadriga.shared.config.motors import MotorsConfig
 from quadriga.shared.messages import Command
 from quadriga.shared.robots.a1 import A1
 from quadriga.shared.robots.conventions import N_JOINTS, Array
@@ -19,7 +18,7 @@ from quadriga.shared.robots.registry import ROBOTS
 from quadriga.shared.robots.torque_speed import motor_curves, torque_range
 from quadriga.sim_server.world.motors import Motors
 from quadriga.sim_server.world.world import World
-from tests.sim_server.standing import IDEAL_MOTORS, STAND, command, configured, stand
+from tests.sim_server.standing import IDEAL_MOTORS, command, configured
 
 SOUND = np.ones((1, N_JOINTS))
 IDLE = command()
@@ -38,13 +37,7 @@ def drive(of: Motors, asked: Command, q: float = 0.0, v: float = 0.0) -> Array:
     return left
 
 
-def test_ideal_motors_give_what_is_commanded_within_their_limit() -> None:
-    asked = command(tau=np.linspace(-50, 50, N_JOINTS), q_des=0.3, v_des=1.0, kp=20.0, kd=2.0)
-    wanted = asked.tau + 20.0 * (0.3 - 0.1) + 2.0 * (1.0 + 15.0)
-    np.testing.assert_allclose(drive(motors(), asked, 0.1, -15.0), np.clip(wanted, -33.5, 33.5))
-
-
-@pytest.mark.parametrize("delay", [0, 1, 2, 7])
+@pytest.mark.parametrize("delay", [0, 7])
 def test_a_command_acts_as_late_as_the_delay_says(delay: int) -> None:
     of = motors(delay_ms=delay)
     given = [drive(of, command(tau=float(1 + tick)))[0] for tick in range(12)]
@@ -52,6 +45,12 @@ def test_a_command_acts_as_late_as_the_delay_says(delay: int) -> None:
 
 
 def test_torque_follows_as_a_first_order_lag() -> None:
+    of = motors(bandwidth=50.0)
+    beyond = motors(bandwidth=50.0)
+    for _ in range(5):  # what is beyond the limit does not come sooner
+        np.testing.assert_array_equal(
+            drive(of, command(tau=33.5)), drive(beyond, command(tau=335.0))
+        )
     of = motors(bandwidth=50.0)
     given = [drive(of, command(tau=10.0))[0] for _ in range(20)]
     expected = 10.0 * (1.0 - np.exp(-2.0 * math.pi * 50.0 * 1e-3 * np.arange(1, 21)))
@@ -70,7 +69,7 @@ def test_no_motor_drives_beyond_its_torque_speed_line(v: float, tau: float, kind
         assert given[k] == pytest.approx(math.copysign(min(abs(tau), limit), tau), abs=1e-9)
 
 
-@pytest.mark.parametrize("k", range(12))
+@pytest.mark.parametrize("k", [0, 11])
 def test_the_go2_has_unitrees_curve(k: int) -> None:
     """Y1 20.2 N·m driving, Y2 23.4 braking, X1 13.5 and X2 30 rad/s; the knee has a gear more."""
     curves = motor_curves(ROBOTS["go2"], torque_speed=True)
@@ -95,29 +94,19 @@ def test_friction_only_ever_brakes_and_is_no_part_of_what_the_motor_feels(v: flo
 
 @pytest.mark.parametrize("share", [0.5, 0.85])
 def test_a_motor_heats_up_to_the_square_of_its_share_of_continuous_torque(share: float) -> None:
+    """A motor that is asked for more is left with its continuous torque."""
+    hot = motors(heat_time=0.2)
+    assert drive(hot, command(tau=33.5))[0] == 33.5
+    for _ in range(5000):
+        left = drive(hot, command(tau=33.5))[0]
+    assert left == pytest.approx(A1.continuous_torque[0], rel=0.05)
+    assert hot.heat.max() < 1.1
     of = motors(heat_time=0.5)
     tau = share * A1.continuous_torque[0]
     for _ in range(700):
         drive(of, command(tau=tau))
     expected = share**2 * (1.0 - math.exp(-700 / 500))
     np.testing.assert_allclose(of.heat, expected, rtol=2e-3)
-
-
-def test_a_hot_motor_is_left_with_its_continuous_torque() -> None:
-    of = motors(heat_time=0.2)
-    cold = drive(of, command(tau=33.5))[0]
-    for _ in range(5000):
-        hot = drive(of, command(tau=33.5))[0]
-    assert cold == 33.5
-    assert hot == pytest.approx(A1.continuous_torque[0], rel=0.05)
-    assert of.heat.max() < 1.1
-
-
-def test_a_standing_robot_with_real_motors_gets_neither_hot_nor_down() -> None:
-    world = World(configured(1, motors=MotorsConfig(heat_time=0.5)))
-    stand(world, 1500)
-    assert not world.fallen()
-    assert world.motors.heat.max() < 0.5
 
 
 def test_a_joint_that_is_thrown_against_its_stop_stays_within_its_range() -> None:
@@ -135,15 +124,6 @@ def test_a_joint_that_is_thrown_against_its_stop_stays_within_its_range() -> Non
     assert 0.0 < beyond[True] < 0.02 < beyond[False]
 
 
-def test_equal_worlds_with_real_motors_give_equal_bytes() -> None:
-    one, other = (World(configured(2, motors=MotorsConfig())) for _ in range(2))
-    for _ in range(100):
-        for world in (one, other):
-            world.step({"r1": STAND, "r2": STAND})
-    assert one.physics.qpos.tobytes() == other.physics.qpos.tobytes()
-    np.testing.assert_array_equal(one.motors.heat, other.motors.heat)
-
-
 def test_heat_takes_nothing_from_the_torque_that_speed_leaves() -> None:
     """Heat limits the current and speed the voltage: of the two limits the lower one holds."""
     of = motors(torque_speed=True, heat_time=300.0)
@@ -153,11 +133,3 @@ def test_heat_takes_nothing_from_the_torque_that_speed_leaves() -> None:
     assert by_speed < A1.continuous_torque[0]
     assert drive(of, command(tau=40.0), v=fast)[0] == by_speed
     assert drive(of, command(tau=40.0))[0] == A1.continuous_torque[0]
-
-
-def test_a_command_beyond_the_limit_is_not_faster_than_the_limit() -> None:
-    limit, beyond = motors(bandwidth=50.0), motors(bandwidth=50.0)
-    for _ in range(5):
-        np.testing.assert_array_equal(
-            drive(limit, command(tau=33.5)), drive(beyond, command(tau=335.0))
-        )

@@ -16,6 +16,7 @@ from quadriga.shared.errors import ConfigError
 from quadriga.shared.robots.conventions import JOINT_NAMES, robot_names
 from quadriga.sim_server.world.scenario import (
     Push,
+    Scenario,
     WeakMotor,
     build_loads,
     build_scenario,
@@ -29,27 +30,25 @@ from tests.sim_server.standing import configured
 NAMES = robot_names(3)
 
 
-def test_forces_add_up_and_end() -> None:
-    config = configured(3, push="all:10:0:1:1,r2:20:90:1.5:1")
-    scenario = build_scenario(config, build_loads(config))
-    assert scenario.changes() == {1000, 2000, 1500, 2500}
+def built(robots: int, **world: Any) -> Scenario:
+    config = configured(robots, **world)
+    return build_scenario(config, build_loads(config))
+
+
+def test_pushes_add_up_and_end_and_are_announced_with_the_rest() -> None:
+    text = "all:10:0:1:1, r2:20:90:1.5:1"
+    scenario = built(3, push=text, payload=9.0, payload_on="r2", terrain="boxes")
     along, left, none = np.array([10.0, 0.0, 0.0]), np.array([0.0, 20.0, 0.0]), np.zeros(3)
     expected = {
-        999: [none] * 3,
         1000: [along] * 3,
-        1999: [along, along + left, along],
+        1500: [along, along + left, along],
         2000: [none, left, none],
         2500: [none] * 3,
     }
+    assert scenario.forces.keys() == expected.keys()
     for tick, forces in expected.items():
-        np.testing.assert_allclose(scenario.forces(tick), forces, atol=1e-12)
-
-
-def test_events_announce_what_was_configured() -> None:
-    config = configured(
-        3, push="r3:80:90:2:0.2,all:5:0:1:1", payload=9.0, payload_on="r2", terrain="boxes"
-    )
-    events = build_scenario(config, build_loads(config)).events
+        np.testing.assert_allclose(scenario.forces[tick], forces, atol=1e-12)
+    events = scenario.events
     assert [(event.tick, event.kind, event.robot) for event in events] == [
         (0, "start", ""),
         (0, "terrain", ""),
@@ -57,26 +56,24 @@ def test_events_announce_what_was_configured() -> None:
         (1000, "push", "r1"),
         (1000, "push", "r2"),
         (1000, "push", "r3"),
-        (2000, "push", "r3"),
+        (1500, "push", "r2"),
     ]
     assert events[2].detail == "9 kg"
-    assert events[-1].detail == "80 N towards 90 deg for 0.2 s"
-    assert events[-1].stamp_ns == 2_000_000_000
+    assert events[-1].detail == "20 N towards 90 deg for 1 s"
+    assert events[-1].stamp_ns == 1_500_000_000
 
 
 def test_what_is_drawn_is_announced() -> None:
-    config = configured(
+    scenario = built(
         3,
         payload=6.0,
         payload_on="r1:2,r3",
         payload_scatter=0.05,
         push_force=90.0,
-        weak_motor="r2:FL_calf:1.5",
-        weak_share=0.3,
+        motor_strength="r2:FL_calf:1.5:0.3",
         terrain="slope",
-        seconds=5.0,
+        duration=5.0,
     )
-    scenario = build_scenario(config, build_loads(config))
     (_, ground, *payloads, fault, push) = scenario.events
     assert ground.detail == "slope of 8 deg up to 0.05 m, seed 0"
     assert [(event.robot, event.detail.split(",")[0]) for event in payloads] == [
@@ -87,21 +84,18 @@ def test_what_is_drawn_is_announced() -> None:
     assert (fault.tick, fault.kind, fault.robot) == (1500, "fault", "r2")
     assert fault.detail == "FL_calf gives 30 % of its torque"
     assert push.kind == "push"
-    assert push.tick == scenario.pushes[0].start
+    assert push.tick in scenario.forces
     assert push.detail.startswith("90 N towards ")
 
 
 def test_a_motor_is_weak_from_its_tick_on_and_gives_what_is_announced() -> None:
-    config = configured(2, weak_motor="r2:FR_hip:1,r2:FR_hip:2", weak_share=0.5)
-    scenario = build_scenario(config, build_loads(config))
-    assert scenario.weakenings() == {1000, 2000}
-    assert (scenario.strength(999) == 1.0).all()
+    scenario = built(2, motor_strength="r2:FR_hip:2:0.5, r1:FL_hip:1:0.5")
+    assert scenario.strength.keys() == {1000, 2000}
+    assert scenario.strength[1000][0, 0] == scenario.strength[2000][1, 3] == 0.5
+    assert scenario.strength[1000].sum() == 23.5
+    assert scenario.strength[2000].sum() == 23.0
     details = [event.detail for event in scenario.events if event.kind == "fault"]
-    assert details == ["FR_hip gives 50 % of its torque"] * 2
-    for tick, share in ((1000, 0.5), (1999, 0.5), (2000, 0.5)):
-        strength = scenario.strength(tick)
-        assert strength[1, 3] == share
-        assert strength.sum() == 23 + share
+    assert details == ["FR_hip gives 50 % of its torque", "FL_hip gives 50 % of its torque"]
 
 
 def masses(config: Config) -> list[float]:
@@ -117,32 +111,24 @@ def test_a_load_is_shared_carried_by_one_or_by_some_with_shares_of_their_own() -
     assert swept == pytest.approx([12.0, 0.0, 8.0])
 
 
-def test_a_load_lies_somewhere_else_with_another_seed() -> None:
-    places = np.array(
-        [
-            [
-                load.offset
-                for load in build_loads(configured(2, payload=1.0, payload_scatter=0.05, seed=s))
-            ]
-            for s in range(50)
-        ]
-    )
+def test_a_load_lies_somewhere_else_with_another_seed_whoever_else_carries_something() -> None:
+    def offsets(robots: int, seed: int, on: str = "team") -> list[tuple[float, float]]:
+        keys = {"payload": 1.0, "payload_scatter": 0.05, "seed": seed, "payload_on": on}
+        return [load.offset for load in build_loads(configured(robots, **keys))]  # type: ignore[arg-type]
+
+    places = np.array([offsets(2, seed) for seed in range(50)])
     assert np.abs(places).max() <= 0.05
     assert places.std(axis=0).min() > 0.02
     assert not np.allclose(places[:, 0], places[:, 1])
+    assert offsets(2, 4, "r2")[1] == offsets(5, 4)[1]
     assert build_loads(configured(2, payload=1.0, seed=3))[0].offset == (0.0, 0.0)
-
-
-def test_who_else_carries_something_does_not_move_a_load() -> None:
-    all_of_them = build_loads(configured(5, payload=9.0, payload_scatter=0.05, seed=4))
-    alone = build_loads(configured(2, payload=9.0, payload_scatter=0.05, seed=4, payload_on="r2"))
-    assert alone[1].offset == all_of_them[1].offset
 
 
 def test_the_world_has_the_load_where_it_is_said_to_be() -> None:
     config = configured(2, payload=9.0, payload_on="r2", payload_scatter=0.1, seed=3)
     model, load = build_team_model(config).model, build_loads(config)[1]
     assert model.body("r2/payload").mass == pytest.approx([9.0])
+    assert 0.06 <= model.body("r2/payload").pos[2] <= 0.12
     np.testing.assert_allclose(model.body("r2/payload").pos[:2], load.offset)
     x, y = load.offset
     assert load.detail == f"9 kg, {1000 * x:+.0f} mm ahead, {1000 * y:+.0f} mm left"
@@ -162,13 +148,12 @@ def test_pushes_are_parsed() -> None:
         ("r1:80:0:1", "robot:force"),
         ("r1:80:0:1:0.2:3", "robot:force"),
         ("r9:80:0:1:0.2", "robot 'r9'"),
-        ("r1:strong:0:1:0.2", "robot:force"),
-        ("r1:-5:0:1:0.2", "force -5"),
-        ("r1:nan:0:1:0.2", "force nan"),
-        ("r1:1e9:0:1:0.2", r"force 1e\+09"),
-        ("r1:80:inf:1:0.2", "direction inf"),
-        ("r1:80:0:-1:0.2", "start -1"),
-        ("r1:80:0:1:0", "duration 0"),
+        ("r1:strong:0:1:0.2", "force 'strong'"),
+        ("r1:nan:0:1:0.2", "force 'nan'"),
+        ("r1:1e9:0:1:0.2", "force '1e9'"),
+        ("r1:80:inf:1:0.2", "direction 'inf'"),
+        ("r1:80:0:-1:0.2", "start '-1'"),
+        ("r1:80:0:1:0", "duration '0'"),
         ("r1:80:0:1:0.2,", "robot:force"),
         (",", "robot:force"),
     ],
@@ -188,13 +173,12 @@ def test_any_text_is_parsed_or_refused(text: str) -> None:
 
 
 def series(seed: int = 0, **world: Any) -> tuple[Push, ...]:
-    config = configured(3, **{"push_force": 80.0, "seconds": 20.0} | world)
+    config = configured(3, **{"push_force": 80.0, "duration": 20.0} | world)
     return push_series(config, np.random.default_rng(seed))
 
 
-def test_a_series_pushes_the_robots_in_turn_sideways() -> None:
+def test_a_series_pushes_the_robots_in_turn_sideways_as_the_seed_decides() -> None:
     pushes = series(push_every=2.0, push_duration=0.1)
-    assert len(pushes) == 9
     assert Counter(push.robots for push in pushes) == {(0,): 3, (1,): 3, (2,): 3}
     assert len({push.robots for push in pushes[:3]}) == 3
     assert {push.force for push in pushes} == {80.0}
@@ -202,22 +186,16 @@ def test_a_series_pushes_the_robots_in_turn_sideways() -> None:
     assert {push.stop - push.start for push in pushes} == {100}
     for k, push in enumerate(pushes, start=1):
         assert 2000 * k <= push.start < 2000 * k + 400  # within one period of the gait
-
-
-def test_another_seed_pushes_others_at_other_times_from_other_sides() -> None:
     many = [series(seed) for seed in range(40)]
     assert series(3) == series(3)
-    assert len({tuple((p.robots, p.direction, p.start) for p in pushes) for pushes in many}) == 40
     assert {pushes[0].robots for pushes in many} == {(0,), (1,), (2,)}
     assert len({pushes[0].direction for pushes in many}) == 2
     assert len({pushes[0].start for pushes in many}) > 30
 
 
 def test_the_force_sweeps_a_series_without_moving_it() -> None:
-    weak, strong = series(push_force=80.0), series(push_force=240.0)
-    assert [(p.robots, p.direction, p.start) for p in weak] == [
-        (p.robots, p.direction, p.start) for p in strong
-    ]
+    strong = series(push_force=240.0)
+    assert [push._replace(force=80.0) for push in strong] == list(series(push_force=80.0))
     assert {push.force for push in strong} == {240.0}
     spread = [p.force for seed in range(20) for p in series(seed, push_spread=0.2)]
     assert 64.0 <= min(spread) < 68.0
@@ -226,14 +204,14 @@ def test_the_force_sweeps_a_series_without_moving_it() -> None:
 
 
 def weak(text: str, seed: int = 0) -> tuple[WeakMotor, ...]:
-    return weak_motors(configured(3, weak_motor=text), np.random.default_rng(seed))
+    return weak_motors(configured(3, motor_strength=text), np.random.default_rng(seed))
 
 
 def test_motors_are_named_by_robot_and_joint() -> None:
-    first, second = weak("r2:RL_thigh:1.5, r3:FL_hip:0")
+    first, second = weak("r2:RL_thigh:1.5, r3:FL_hip:0:0.25")
     assert (first.robot, JOINT_NAMES[first.joint], first.start) == (1, "RL_thigh_joint", 1500)
     assert (second.robot, JOINT_NAMES[second.joint], second.start) == (2, "FL_hip_joint", 0)
-    assert first.share == 0.6
+    assert (first.share, second.share) == (0.6, 0.25)
     assert weak("") == ()
 
 
@@ -262,8 +240,11 @@ def test_what_is_left_open_is_drawn_from_the_seed(joint: str, among: set[str]) -
         ("r1:calf:-1", "start '-1'"),
         ("r1:calf:nan", "start 'nan'"),
         ("r1:calf:0,", "robot:joint:start"),
+        ("r1:calf:0:0.5:1", "robot:joint:start"),
+        ("r1:calf:0:1.5", "share '1.5'"),
+        ("r1:calf:0:half", "share 'half'"),
     ],
 )
 def test_a_wrong_motor_names_the_key_and_what_is_wrong(text: str, message: str) -> None:
-    with pytest.raises(ConfigError, match=rf"^world\.weak_motor: .*{message}"):
+    with pytest.raises(ConfigError, match=rf"^world\.motor_strength: .*{message}"):
         weak(text)

@@ -1,19 +1,15 @@
 from dataclasses import replace
-from itertools import combinations
 
 import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from quadriga.shared.config.yokes import yoke_pairs
 from quadriga.shared.robots.a1 import A1
 from quadriga.shared.robots.conventions import FOOT_FRAMES, JOINT_NAMES, N_JOINTS
 from quadriga.shared.robots.pinocchio_model import build_pinocchio_model
 from quadriga.shared.robots.registry import ROBOTS
-from quadriga.sim_server.terrain.relief import TERRAIN_CONTACT
+from quadriga.sim_server.terrain.terrain import TERRAIN_CONTACT
 from quadriga.sim_server.world.layout import CONTACT_FORCES, FOOT_FORCES, NQ
 from quadriga.sim_server.world.team_model import build_team_model, formation, spawn_positions
 from tests.sim_server.standing import IDEAL_MOTORS, configured
@@ -22,7 +18,7 @@ GRAPHS = ("complete", "chain", "ring")
 
 
 @pytest.mark.parametrize("kind", ROBOTS)
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("rotors", [False, True])
 def test_equals_pinocchio_in_mass_matrix_bias_and_foot_jacobians(
     kind: str, seed: int, rotors: bool
@@ -84,19 +80,6 @@ def test_every_robot_has_pinocchios_joint_order_and_the_agreed_mass() -> None:
         assert model.body(f"{robot}/trunk").subtreemass == pytest.approx(A1.mass)
 
 
-@given(n=st.integers(1, 10), graph=st.sampled_from(GRAPHS))
-def test_yoke_graphs_connect_the_team(n: int, graph: str) -> None:
-    pairs = yoke_pairs(n, graph)
-    assert len(set(pairs)) == len(pairs)
-    assert set(pairs) <= set(combinations(range(n), 2))
-    ring = n if n > 2 else n - 1
-    assert len(pairs) == {"complete": n * (n - 1) // 2, "chain": n - 1, "ring": ring}[graph]
-    reached = {0}
-    for _ in range(n):
-        reached |= {k for pair in pairs if reached & set(pair) for k in pair}
-    assert reached == set(range(n))
-
-
 @pytest.mark.parametrize("graph", GRAPHS)
 def test_yokes_are_as_long_as_the_distance_of_the_spawned_trunks(graph: str) -> None:
     team = build_team_model(configured(5, yokes=graph))
@@ -106,21 +89,9 @@ def test_yokes_are_as_long_as_the_distance_of_the_spawned_trunks(graph: str) -> 
     assert team.model.ntendon == team.model.neq == len(gaps)
 
 
-@given(n=st.integers(1, 10), spacing=st.floats(0.6, 3.0))
-def test_robots_start_at_least_their_spacing_apart_along_the_columns(
-    n: int, spacing: float
-) -> None:
-    places = formation(n, spacing)
-    assert places.shape == (n, 2)
-    for i, j in combinations(range(n), 2):
-        assert np.linalg.norm(places[i] - places[j]) >= spacing - 1e-9
-    if n % 2:
-        assert places[-1, 1] == 0.0
-    if n == 1:
-        assert not places.any()
-
-
 def test_robots_are_scattered_around_their_places_by_the_seed() -> None:
+    np.testing.assert_allclose(formation(3, 0.9), [[0.0, 0.45], [0.0, -0.45], [-0.9, 0.0]])
+    assert not formation(1, 0.9).any()
     places = np.array([spawn_positions(configured(3, scatter=0.05, seed=s)) for s in range(40)])
     off = places - formation(3, 0.9)
     assert np.abs(off).max() <= 0.05
@@ -129,15 +100,6 @@ def test_robots_are_scattered_around_their_places_by_the_seed() -> None:
     team = build_team_model(configured(3, scatter=0.05, seed=7))
     np.testing.assert_allclose(team.q_spawn.reshape(3, NQ)[:, :2], places[7])
     assert len(set(team.rest_length.round(6))) == 3
-
-
-def test_payload_adds_its_mass_above_the_trunk() -> None:
-    bare = build_team_model(configured(2)).model
-    laden = build_team_model(configured(2, payload=9.0, payload_on="r2")).model
-    for name, extra in (("r1", 0.0), ("r2", 9.0)):
-        more = laden.body(f"{name}/trunk").subtreemass - bare.body(f"{name}/trunk").subtreemass
-        assert more == pytest.approx([extra])
-    assert 0.06 <= laden.body("r2/payload").pos[2] <= 0.12
 
 
 @pytest.mark.parametrize("leg_collisions", [False, True])

@@ -8,18 +8,15 @@ import pytest
 from quadriga.plant.commands import MOTOR_DAMPING
 from quadriga.shared.codec import decode, encode
 from quadriga.shared.config.sections import Config
-from quadriga.shared.errors import ConfigError
-from quadriga.shared.messages import Event, State, Truth
+from quadriga.shared.messages import Event, Truth
 from quadriga.shared.robots.a1 import A1
-from quadriga.shared.robots.conventions import GRAVITY, N_JOINTS
+from quadriga.shared.robots.conventions import GRAVITY, N_JOINTS, Array
 from quadriga.sim_server.world.world import World
 from tests.a1 import TORQUE_LIMIT, TOTAL_MASS, q_stand
 from tests.sim_server.standing import STAND, command, configured, momentum, shift, stand
 
-TERRAINS = ("flat", "boxes", "gravel", "heightfield", "slope")
 
-
-@pytest.mark.parametrize("n", [1, 2, 5])
+@pytest.mark.parametrize("n", [1, 5])
 def test_standing_team_stays_up_and_the_ground_carries_its_weight(n: int) -> None:
     world = World(configured(n, payload=10.0))
     stand(world, 800)
@@ -29,19 +26,6 @@ def test_standing_team_stays_up_and_the_ground_carries_its_weight(n: int) -> Non
     assert truth.grf[:, :, 2].sum() == pytest.approx(weight, rel=5e-3)
     assert np.abs(truth.yoke_error).max(initial=0.0) < 1e-4
     assert truth.yoke_error.shape == truth.yoke_force.shape == (n * (n - 1) // 2,)
-
-
-@pytest.mark.parametrize("terrain", TERRAINS)
-def test_team_stands_on_every_terrain(terrain: str) -> None:
-    # A shank that leans on a block would carry a share of the weight.
-    config = configured(3, terrain=terrain, terrain_height=0.04, seconds=8.0, leg_collisions=False)
-    world = World(config)
-    shift(world, dx=3.0, dz=0.03)
-    stand(world, 800)
-    assert world.fallen() == ()
-    truth = world.truth()
-    assert truth.grf[:, :, 2].sum() == pytest.approx(3 * TOTAL_MASS * GRAVITY, rel=0.02)
-    assert np.abs(truth.yoke_error).max() < 1e-3
 
 
 def test_yoke_force_is_negative_when_the_yoke_pulls() -> None:
@@ -57,32 +41,16 @@ def test_equal_configurations_and_commands_give_equal_bytes() -> None:
         3, noise=True, terrain="boxes", push="r1:60:90:0.1:0.1", payload=4.5, seed=3
     )
     first, second = World(config), World(config)
+    assert first.states()["r1"].row.tobytes() == first.states()["r1"].row.tobytes()
     for tick in range(300):
         commands = {"r1": STAND, "r2": STAND} if tick % 2 else {"r2": STAND, "r1": STAND}
         assert first.step(commands) == second.step(commands)
         for name in first.names:
             assert encode(first.states()[name]) == encode(second.states()[name])
     assert encode(first.truth()) == encode(second.truth())
+    assert tuple(decode(encode(first.truth()), Truth).robots) == first.names
     other = World(replace(config, world=replace(config.world, seed=4)))
     assert encode(other.states()["r1"]) != encode(World(config).states()["r1"])
-
-
-def test_states_of_a_tick_do_not_change_however_often_they_are_asked() -> None:
-    world = World(configured(2, noise=True))
-    for _ in range(3):
-        first, again = world.states(), world.states()
-        assert {k: encode(v) for k, v in first.items()} == {k: encode(v) for k, v in again.items()}
-        assert all(state.tick == world.tick for state in first.values())
-        world.step({})
-
-
-def test_messages_pass_the_codec() -> None:
-    for n in (1, 3):
-        world = World(configured(n, noise=True))
-        stand(world, 5)
-        assert tuple(decode(encode(world.truth()), Truth).robots) == world.names
-        for state in world.states().values():
-            assert decode(encode(state), State).tick == 5
 
 
 def test_a_push_changes_the_momentum_by_its_impulse() -> None:
@@ -168,7 +136,7 @@ def test_motor_law_is_followed_and_limited() -> None:
 
 
 def test_a_weak_motor_gives_its_share_of_the_torque_from_its_time_on() -> None:
-    config = configured(2, weak_motor="r2:RL_calf:0.01", weak_share=0.4)
+    config = configured(2, motor_strength="r2:RL_calf:0.01:0.4")
     world, sound = World(config), World(configured(2))
     asked = command(tau=np.linspace(-40.0, 40.0, N_JOINTS))
     for tick in range(12):
@@ -209,17 +177,8 @@ def test_a_fall_is_announced_once_per_robot() -> None:
     assert [event.kind for event in events[:2]] == ["start", "terrain"]
 
 
-def test_a_robot_on_its_side_has_fallen_at_any_height() -> None:
-    world = World(configured(1))
-    world.physics.qpos[2] = 1.0
-    world.physics.qpos[3:7] = [np.cos(0.55), np.sin(0.55), 0.0, 0.0]
-    mujoco.mj_forward(world.team.model, world.physics)
-    events = world.step({"r1": STAND})
-    assert [event.robot for event in events if event.kind == "fall"] == ["r1"]
-
-
 def test_trunk_height_counts_from_the_terrain_under_the_hips() -> None:
-    world = World(configured(1, terrain="heightfield", terrain_height=0.3, seconds=8.0))
+    world = World(configured(1, terrain="heightfield", terrain_height=0.3, duration=8.0))
     x = np.linspace(2.0, 5.0, 3000)
     under = world.team.terrain.height_under_hips(
         x, np.zeros_like(x), np.zeros_like(x), A1.feet_under_hips
@@ -236,7 +195,7 @@ def test_trunk_height_counts_from_the_terrain_under_the_hips() -> None:
 
 def test_who_stands_astride_of_a_block_has_not_fallen() -> None:
     """The block is under the trunk and nobody touches it; the feet stand on the ground."""
-    world = World(configured(1, terrain="boxes", terrain_height=0.15, seconds=8.0))
+    world = World(configured(1, terrain="boxes", terrain_height=0.15, duration=8.0))
     terrain = world.team.terrain
     x, y = (axis.ravel() for axis in np.meshgrid(np.arange(1.5, 5, 0.02), np.arange(-1, 1, 0.02)))
     astride = terrain.height(x, y) - terrain.height_under_hips(
@@ -267,57 +226,18 @@ def test_an_unstable_world_is_named_and_does_not_start_again(
     assert not [*tmp_path.iterdir()]
 
 
-@pytest.mark.parametrize("terrain", TERRAINS)
-def test_feet_have_the_configured_friction_on_every_terrain(terrain: str) -> None:
-    world = World(configured(1, terrain=terrain, friction=0.35, terrain_height=0.04, seconds=8.0))
+@pytest.mark.parametrize("terrain", ["flat", "boxes", "heightfield"])
+def test_feet_have_the_configured_friction_and_one_robot_alone_another(terrain: str) -> None:
+    ground = {"terrain": terrain, "terrain_height": 0.04, "duration": 8.0}
+    world = World(configured(3, friction=0.35, friction_of="r2:0.3", **ground))  # type: ignore[arg-type]
     shift(world, dx=3.0, dz=0.03)
     stand(world, 300)
-    assert world.physics.ncon >= 2
-    np.testing.assert_allclose(world.physics.contact.friction[:, 0], 0.35)
-    np.testing.assert_allclose(world.physics.contact.solref, [[0.01, 1.0]] * world.physics.ncon)
-
-
-def test_one_robot_alone_may_stand_on_slippery_ground() -> None:
-    world = World(configured(3, friction_of="r2:0.3"))
-    stand(world, 100)
     model, contact = world.team.model, world.physics.contact
     roots = model.body_rootid[model.geom_bodyid[contact.geom]].max(axis=1)
     slippery = roots == world.team.trunks[1]
     assert 0 < slippery.sum() < len(slippery)
-    np.testing.assert_allclose(contact.friction[:, 0], np.where(slippery, 0.3, 0.8))
-
-
-def test_a_series_of_pushes_moves_who_it_is_said_to_push() -> None:
-    config = configured(
-        3, yokes="chain", push_force=60.0, push_every=0.1, push_duration=0.02, seconds=0.2
-    )
-    world = World(config)
-    shift(world, dz=10.0)  # in the air nothing else acts sideways
-    events = [event for _ in range(600) for event in world.step({}) if event.kind == "push"]
-    assert len(events) == 1
-    left = 1.0 if "towards 90 deg" in events[0].detail else -1.0
-    np.testing.assert_allclose(momentum(world)[:2], [0.0, left * 60.0 * 0.02], atol=0.02)
-    pushed = np.abs(world.truth().base_vel[:, 1]).argmax()
-    assert world.names[pushed] == events[0].robot
-
-
-def test_feet_slide_when_pushed_harder_than_friction_holds() -> None:
-    for push, slides in ((30.0, False), (60.0, True)):  # friction holds 0.35 · 122 N = 43 N
-        world = World(configured(1, friction=0.35, push=f"r1:{push}:90:0.5:0.3"))
-        stand(world, 500)
-        before = world.physics.body("r1/FL_foot").xpos.copy()
-        stand(world, 300)
-        moved = world.physics.body("r1/FL_foot").xpos[1] - before[1]
-        assert (moved > 0.02) == slides
-
-
-@pytest.mark.parametrize(
-    ("key", "wrong"),
-    [("push", configured(2, push="r3:1:0:0:1")), ("payload_on", configured(2, payload_on="x"))],
-)
-def test_a_wrong_scenario_is_refused(key: str, wrong: Config) -> None:
-    with pytest.raises(ConfigError, match=rf"^world\.{key}: "):
-        World(wrong)
+    np.testing.assert_allclose(contact.friction[:, 0], np.where(slippery, 0.3, 0.35))
+    np.testing.assert_allclose(contact.solref, [[0.01, 1.0]] * world.physics.ncon)
 
 
 def test_when_a_tick_is_settled_changes_nothing() -> None:
@@ -330,3 +250,58 @@ def test_when_a_tick_is_settled_changes_nothing() -> None:
     assert early.physics.qpos.tobytes() == late.physics.qpos.tobytes()
     assert encode(early.truth()) == encode(late.truth())
     assert encode(early.states()["r2"]) == encode(late.states()["r2"])
+
+
+PUSHES = "r1:60:90:0.01:0.05,r2:60:0:0.02:0.05"
+
+
+@pytest.fixture
+def apart() -> Config:
+    return configured(
+        3, yokes="none", noise=True, push=PUSHES, scatter=0.1, payload=2.0, payload_on="r2:1"
+    )
+
+
+def own(truth: Truth, robot: str) -> Array:
+    place: Array = truth.base_pos[truth.robots.index(robot)]
+    return place
+
+
+def test_it_starts_at_its_place_with_its_own_noise(apart: Config) -> None:
+    together = World(apart)
+    for name in together.names:
+        alone = World(apart, (name,))
+        assert alone.names == (name,)
+        np.testing.assert_array_equal(own(alone.truth(), name), own(together.truth(), name))
+        np.testing.assert_allclose(alone.states()[name].row, together.states()[name].row, atol=1e-9)
+
+
+def test_it_moves_as_it_would_beside_the_others(apart: Config) -> None:
+    together, calm = World(apart), World(replace(apart, world=replace(apart.world, push="")))
+    alone = {name: World(apart, (name,)) for name in together.names}
+    stand(together, 100)
+    stand(calm, 100)
+    for name, world in alone.items():
+        stand(world, 100)
+        place = own(world.truth(), name)
+        np.testing.assert_allclose(place, own(together.truth(), name), atol=1e-4)
+        pushed = np.abs(place - own(calm.truth(), name)).max() > 1e-3
+        assert pushed == (name in PUSHES)
+
+
+def test_what_happens_to_others_is_none_of_its_events(apart: Config) -> None:
+    events = {
+        name: [event for _ in range(100) for event in world.step({})]
+        for name in ("r1", "r2", "r3")
+        for world in [World(apart, (name,))]
+    }
+    found = {name: [(e.kind, e.robot) for e in of] for name, of in events.items()}
+    assert found["r1"] == [("start", ""), ("terrain", ""), ("push", "r1")]
+    assert found["r2"] == [("start", ""), ("terrain", ""), ("payload", "r2"), ("push", "r2")]
+    assert found["r3"] == [("start", ""), ("terrain", "")]
+
+
+def test_yokes_are_those_between_the_robots_that_are_there() -> None:
+    chain = configured(3, yokes="chain")
+    assert World(chain, ("r2", "r3")).team.yokes == ((0, 1),)
+    assert World(chain, ("r1", "r3")).team.yokes == ()

@@ -18,8 +18,8 @@ from quadriga.shared.robots.conventions import JOINT_NAMES
 from quadriga.shared.unitree.codecs import A1
 from quadriga.shared.unitree.packets import NO_ANGLE, NO_RATE, OFF, PROTECTED, SERVO, RobotReport
 from quadriga.shared.unitree.udp import Address
-from quadriga.sim_server.emulator.board import RobotStatus, UdpBoard, open_boards
 from quadriga.sim_server.emulator.link import LinkFaults
+from quadriga.sim_server.emulator.robot_emulator import RobotStatus, UdpEmulator, open_emulators
 from quadriga.sim_server.world.world import World
 from tests.bridges.robots import config_of, holding
 from tests.bridges.test_udp_driver import HOST, free_port
@@ -34,7 +34,7 @@ class Bench:
 
     def __init__(self) -> None:
         robot, listen = Address(HOST, free_port()), Address(HOST, free_port())
-        self.robot = UdpBoard(A1, robot, seed=(5,))
+        self.robot = UdpEmulator(A1, robot, seed=(5,))
         self.driver = UdpDriver("a1", BridgeConfig(f"{HOST}:{robot.port}", f"{HOST}:{listen.port}"))
         self.now = 0
         self.command: Command | None = None
@@ -95,43 +95,39 @@ def test_it_obeys_the_last_command_until_another_comes(bench: Bench) -> None:
     assert bench.command is None
 
 
+NO, LOST, LATE = LinkFaults(), LinkFaults(loss=1.0), LinkFaults(delay=5.0)
+
+
 @pytest.mark.parametrize(
-    ("inwards", "outwards", "reports", "commands"),
+    ("inwards", "outwards", "reports", "commands", "counters"),
     [
-        (LinkFaults(loss=1.0), LinkFaults(), 20, 0),
-        (LinkFaults(), LinkFaults(loss=1.0), 0, 20),
-        (LinkFaults(delay=5.0), LinkFaults(delay=5.0), 15, 15),
+        (LOST, NO, 20, 0, {}),
+        (NO, LOST, 0, 20, {}),
+        (LATE, LATE, 15, 15, {}),
+        (NO, LinkFaults(duplicate=1.0), 20, 20, {"repeated": 20}),
+        (NO, LinkFaults(reorder=1.0), 10, 20, {"older": 10}),
+        (LinkFaults(garbage=1.0), LinkFaults(garbage=1.0), 0, 0, {"malformed": 20}),
     ],
 )
-def test_packets_are_lost_and_late_each_way(
-    bench: Bench, inwards: LinkFaults, outwards: LinkFaults, reports: int, commands: int
+def test_what_happens_on_each_way_is_what_both_ends_count(
+    bench: Bench,
+    inwards: LinkFaults,
+    outwards: LinkFaults,
+    reports: int,
+    commands: int,
+    counters: dict[str, int],
 ) -> None:
     bench.robot.inwards.faults, bench.robot.outwards.faults = inwards, outwards
     assert bench.ticks(20, send=True) == reports
     assert bench.robot.received == commands
-
-
-@pytest.mark.parametrize(
-    ("faults", "counter", "count"),
-    [
-        (LinkFaults(duplicate=1.0), "repeated", 10),
-        (LinkFaults(reorder=1.0), "older", 5),
-        (LinkFaults(garbage=1.0), "malformed", 10),
-    ],
-)
-def test_damage_is_what_the_driver_counts(
-    bench: Bench, faults: LinkFaults, counter: str, count: int
-) -> None:
-    bench.robot.inwards.faults = bench.robot.outwards.faults = faults
-    bench.ticks(10, send=True)
-    assert bench.driver.counters[counter] == count
-    assert bench.robot.malformed == (count if counter == "malformed" else 0)
+    assert {name: bench.driver.counters[name] for name in counters} == counters
+    assert bench.robot.malformed == counters.get("malformed", 0)
 
 
 def test_two_writers_take_turns_at_the_motors_until_one_leaves(bench: Bench) -> None:
     bench.robot.add_second_writer()
     bench.robot.add_second_writer()  # one is enough
-    driven = 0
+    bench.robot.status.charge, driven = 8.0, 0
     for _ in range(200):
         bench.tick(send=True)
         assert bench.command is not None
@@ -142,21 +138,12 @@ def test_two_writers_take_turns_at_the_motors_until_one_leaves(bench: Bench) -> 
     assert not bench.command.kp.any()
     assert not bench.command.tau.any()
     np.testing.assert_array_equal(bench.command.kd, 2.0)
-    bench.robot.clear()
-    bench.tick(send=True)
-    assert bench.ticks(10) == 10
-
-
-def test_all_is_well_again_when_it_is_cleared(bench: Bench) -> None:
     bench.robot.inwards.faults = bench.robot.outwards.faults = LinkFaults(0.5, 0.5, 0.5, 0.5)
-    bench.robot.status.charge = 8.0
-    bench.robot.status.protected.add(3)
     bench.ticks(20, send=True)
     bench.robot.clear()
     bench.tick(send=True)
-    assert bench.ticks(20, send=True) == 20
+    assert bench.ticks(20, send=True) == 20, "all is well again"
     assert bench.robot.status.charge == 80.0
-    assert bench.command is not None
     assert bench.command.kp.all()
 
 
@@ -172,14 +159,10 @@ def test_a_motor_in_protection_mode_says_so_and_gives_nothing() -> None:
     for values in (command.tau, command.kp, command.kd):
         assert values[joint] == 0.0
         assert np.delete(values, joint).all()
-
-
-def test_what_is_not_asked_for_is_not_an_angle() -> None:
     nothing = {"q": np.full(12, NO_ANGLE), "dq": np.full(12, NO_RATE)}
-    free = holding(config_of(), kp=COLD, kd=COLD, tau=np.ones(12), **nothing)
-    command = RobotStatus().command(free)
-    assert command is not None
-    np.testing.assert_array_equal([command.q_des, command.v_des], 0.0)
+    free = RobotStatus().command(holding(config_of(), kp=COLD, kd=COLD, tau=COLD + 1.0, **nothing))
+    assert free is not None
+    np.testing.assert_array_equal([free.q_des, free.v_des], 0.0)
 
 
 def test_each_robot_may_have_a_network_of_its_own_and_then_domain_0_like_a_real_one() -> None:
@@ -188,20 +171,17 @@ def test_each_robot_may_have_a_network_of_its_own_and_then_domain_0_like_a_real_
     ways = [bridge_of(config, name) for name in ("r1", "r2")]
     assert [(way.interface, way.domain) for way in ways] == [("nowhere1", 0), ("nowhere2", 0)]
     with pytest.raises(BridgeError, match="DDS domain 0 on 'nowhere1'"):
-        open_boards(config)
+        open_emulators(config)
     config = load(overrides={**keys, "bridge.interface": "lo", "bridge.domain": 186})
     ways = [bridge_of(config, name) for name in ("r1", "r2")]
     assert [(way.interface, way.domain) for way in ways] == [("lo", 186), ("lo", 187)]
 
 
-def test_what_is_open_is_closed_if_another_cannot_be_opened() -> None:
+def test_what_is_open_is_closed_if_another_cannot_be_opened_or_has_no_address() -> None:
     port = free_port()
     keys = {"team.robots": 2, "bridge.endpoint": f"{HOST}:{port}"}  # the same for both
     for _ in range(2):  # the first robot's port is free again
         with pytest.raises(BridgeError, match=f"UDP port {port} of {HOST}"):
-            open_boards(load(overrides=keys))
-
-
-def test_robots_without_an_address_of_their_own_are_refused() -> None:
+            open_emulators(load(overrides=keys))
     with pytest.raises(ConfigError, match=r"bridge\.endpoint"):
-        open_boards(load(overrides={"team.robots": 1}))
+        open_emulators(load(overrides={"team.robots": 1}))

@@ -1,7 +1,7 @@
-"""Boards of emulated robots: from the world's messages to a robot's own packets, and back.
+"""Emulated robots: from the world's messages to a robot's own packets, and back.
 
-Like a real one a board has no watchdog: while no packet comes, its motors go on with the last
-command.
+Like a real one an emulated robot has no watchdog: while no packet comes, its motors go on with the
+last command.
 """
 
 from __future__ import annotations
@@ -57,30 +57,21 @@ _LOOPBACK: Final = "lo"
 
 @dataclass
 class RobotStatus:
-    """What a robot reports beside what its world measures: counter, battery, remote, motors.
+    """What a robot reports beside what its world measures.
 
     Its counter counts milliseconds, as those of Unitree's simulators do, from a number that means
     nothing.
-
-    Attributes:
-        first: what its counter says at tick 0.
-        charge: of its battery, %.
-        remote: what its remote control sends, see `remote_bytes`.
-        protected: motors that have switched themselves off, indices in `JOINT_NAMES`.
     """
 
-    first: int = 0
-    charge: float = 80.0
-    remote: bytes = remote_bytes()
-    protected: set[int] = field(default_factory=set)
+    first: int = 0  # what its counter says at tick 0
+    charge: float = 80.0  # of its battery, %
+    remote: bytes = remote_bytes()  # what its remote control sends
+    protected: set[int] = field(default_factory=set)  # joints whose motors are off by themselves
 
     def report(self, state: State, heat: Array, targets: MotorTargets | None) -> RobotReport:
-        """What a robot says of a tick.
+        """The report of a tick, with what its sensors measure and what its motors do.
 
-        Args:
-            state: what its sensors measure.
-            heat: of the motors, (12,), 1 where continuous torque leads.
-            targets: what the motors do; None: they are off.
+        `heat` is that of the motors, (12,), 1 where continuous torque leads; no targets: off.
         """
         mode = np.full(N_JOINTS, OFF, np.uint8) if targets is None else targets.mode.copy()
         mode[list(self.protected)] = PROTECTED
@@ -113,44 +104,34 @@ class RobotStatus:
         return Command(0, 0, on * targets.tau, q, dq, on * targets.kp, on * targets.kd)
 
 
-class Board(ABC):
-    """What the boards of all kinds of robots do alike.
+class RobotEmulator(ABC):
+    """What emulated robots of all kinds do alike.
 
     Attributes:
         period_ms: between two reports.
+        controller: its own motion controller that has the motors; "" if none has.
         status: of the robot.
         inwards, outwards: the ways of commands and of reports through its network.
         malformed, received: packets that were no commands, and commands.
-
-    Args:
-        codec: of its packets.
-        seed: of its chance.
-        keeps_size: whether its network carries packets of one size only.
     """
 
     period_ms: int
+    controller: str = ""
 
-    def __init__(self, codec: Codec, seed: Sequence[int], *, keeps_size: bool) -> None:
+    def __init__(self, codec: Codec, seed: Sequence[int]) -> None:
         self._codec = codec
-        self.inwards, self.outwards = (Link((*seed, way), keeps_size=keeps_size) for way in (0, 1))
+        self.inwards, self.outwards = Link((*seed, 0)), Link((*seed, 1))
         self._chance = np.random.default_rng((*seed, 2))
         self._first = int(self._chance.integers(_COUNTER))
         self.status = RobotStatus(self._first)
         self._targets: MotorTargets | None = None
+        self._listener: tuple[str, int] | None = None
         self._second_writer: UdpPort | StructWriter | None = None
-        modes, zero = np.full(N_JOINTS, codec.servo, np.uint8), np.zeros(N_JOINTS)
-        harmless = MotorTargets(modes, zero + NO_ANGLE, zero, zero, zero, zero + _DAMPING)
-        self._second_command = codec.encode_command(harmless)
         self._now = 0  # ms
         self.malformed = self.received = 0
 
     def report(self, state: State, heat: Array) -> None:
-        """Send what is due at a tick: what the robot measures, at its rate.
-
-        Args:
-            state: what its sensors measure.
-            heat: of its motors, (12,), 1 where continuous torque leads.
-        """
+        """Send what is due at a tick: what the robot measures, at its rate; see `RobotStatus`."""
         self._now, parcels = state.tick, list[Parcel]()
         if state.tick % self.period_ms == 0:
             report = self.status.report(state, heat, self._targets)
@@ -161,7 +142,9 @@ class Board(ABC):
     def obey(self) -> Command | None:
         """The command that the motors follow now; None: they are off, and brake."""
         if self._second_writer is not None and self._chance.integers(2):
-            self._second_writer.send(self._second_command)
+            modes, zero = np.full(N_JOINTS, self._codec.servo, np.uint8), np.zeros(N_JOINTS)
+            damp = MotorTargets(modes, zero + NO_ANGLE, zero, zero, zero, zero + _DAMPING)
+            self._second_writer.send(self._codec.encode_command(damp))
         for parcel in self.inwards.pass_on(tuple(self._take()), self._now):
             try:
                 targets = self._codec.decode_command(parcel.packet)
@@ -169,8 +152,8 @@ class Board(ABC):
                 self.malformed += 1
                 continue
             self.received += 1
-            if self._accepts(parcel):
-                self._targets = targets
+            self._listener = parcel.sender or self._listener
+            self._targets = self._targets if self.controller else targets
         return self.status.command(self._targets)
 
     def add_second_writer(self) -> None:
@@ -202,21 +185,12 @@ class Board(ABC):
         """What has come from the network, oldest first."""
 
     @abstractmethod
-    def _accepts(self, parcel: Parcel) -> bool:
-        """Whether this command reaches the motors."""
-
-    @abstractmethod
     def _open_writer(self) -> UdpPort | StructWriter:
         """How somebody else writes commands."""
 
 
-class UdpBoard(Board):
-    """An A1's or Go1's: it reports to whoever commanded it last, and to nobody before.
-
-    Args:
-        codec: of its packets.
-        here: where it takes commands.
-        seed: of its chance.
+class UdpEmulator(RobotEmulator):
+    """An A1 or Go1 at an address: it reports to who commanded it last, and to nobody before.
 
     Raises:
         BridgeError: the port is taken.
@@ -225,20 +199,14 @@ class UdpBoard(Board):
     period_ms = 1
 
     def __init__(self, codec: Codec, here: Address, seed: Sequence[int] = (0,)) -> None:
-        super().__init__(codec, seed, keeps_size=False)
+        super().__init__(codec, seed)
         self._here, self._port = here, UdpPort(here)
-        self._listener: Address | None = None
 
     def _send(self, packet: bytes) -> None:
-        self._port.send(packet, self._listener)  # to nobody, nothing
+        self._port.send(packet, self._listener and Address(*self._listener))
 
     def _take(self) -> Iterator[Parcel]:
         return (Parcel(packet, sender) for packet, sender in self._port.drain())
-
-    def _accepts(self, parcel: Parcel) -> bool:
-        if parcel.sender is not None:
-            self._listener = Address(*parcel.sender)
-        return True
 
     def _open_writer(self) -> UdpPort:
         return UdpPort(Address(self._here.host, 0), self._here)
@@ -249,21 +217,15 @@ class UdpBoard(Board):
         self._port.close()
 
 
-class Go2Board(Board):
-    """A Go2's: reports at 500 Hz, commands, its motion switcher and its service `sport`.
+class Go2Emulator(RobotEmulator):
+    """A Go2: reports at 500 Hz, commands, its motion switcher and its service `sport`.
 
     Its own motion controller writes commands like anybody else while it has the motors, and stays
     an idle writer of them when it has let go.
 
     Attributes:
-        controller: its own motion controller that has the motors; "" if none has.
-        lets_go: whether that one lets go of the motors when it is asked to.
+        lets_go: whether its controller lets go of the motors when it is asked to.
         executed: calls that it has answered, each as often as it came.
-
-    Args:
-        domain: of its network.
-        interface: of this machine.
-        seed: of its chance.
 
     Raises:
         ConfigError: CycloneDDS is not installed.
@@ -273,13 +235,12 @@ class Go2Board(Board):
     period_ms = 2
 
     def __init__(self, domain: int, interface: str, seed: Sequence[int] = (0,)) -> None:
-        super().__init__(GO2, seed, keeps_size=True)
+        super().__init__(GO2, seed)
         self._participant = DdsParticipant(domain, interface)
         self._commands = StructReader(self._participant, LOW_COMMANDS, of_others=True)
         self._own_commands = StructWriter(self._participant, LOW_COMMANDS)
         self._reports = StructWriter(self._participant, LOW_STATES)
-        zero = np.zeros(N_JOINTS)
-        modes = np.full(N_JOINTS, OFF, np.uint8)
+        modes, zero = np.full(N_JOINTS, OFF, np.uint8), np.zeros(N_JOINTS)
         self._own_command = GO2.encode_command(MotorTargets(modes, *[zero] * 5))
         self._others = DdsParticipant(domain, interface)  # whoever is on its network, too
         self._switcher = RpcEnd(self._participant, rpc.MOTION_SWITCHER, serves=True)
@@ -289,7 +250,7 @@ class Go2Board(Board):
         self._motions = deque[tuple[int, RpcMessage]]()  # when each is over, tick
 
     def report(self, state: State, heat: Array) -> None:
-        """See `Board`; it also answers what its services have been asked."""
+        """See `RobotEmulator`; it also answers what its services have been asked."""
         super().report(state, heat)
         if state.tick % self.period_ms == 0:
             self._serve()
@@ -300,9 +261,6 @@ class Go2Board(Board):
     def _take(self) -> Iterator[Parcel]:
         while (packet := self._commands.take()) is not None:
             yield Parcel(packet)
-
-    def _accepts(self, parcel: Parcel) -> bool:
-        return not self.controller
 
     def _serve(self) -> None:
         if self.controller:
@@ -326,7 +284,7 @@ class Go2Board(Board):
                 self._targets, self.controller = None, _CONTROLLER
             else:
                 code = rpc.UNKNOWN
-            self._switcher.send(RpcMessage(message.id, message.api, text, code))
+            self._switcher.send(message._replace(text=text, code=code))
 
     def _open_writer(self) -> StructWriter:
         return StructWriter(self._others, LOW_COMMANDS)
@@ -338,32 +296,31 @@ class Go2Board(Board):
         self._participant.close()
 
 
-def open_boards(config: Config) -> dict[str, Board]:
-    """The robots' boards by name, each on a network of its own.
+def open_emulators(config: Config) -> dict[str, RobotEmulator]:
+    """The emulated robots by name, each on a network of its own.
 
     Raises:
         ConfigError: an address does not parse or is missing.
         BridgeError: a port is taken, or there is no such interface.
     """
+    team, bridge, opened = config.team, config.bridge, dict[str, RobotEmulator]()
     with ExitStack() as stack:
-        boards = dict[str, Board]()
-        for index, name in enumerate(robot_names(config.team.robots)):
-            boards[name] = _open_board(config, index)
-            stack.callback(boards[name].close)
+        for index, name in enumerate(robot_names(team.robots)):
+            seed, number = (config.world.seed, _STREAM, index), str(index + 1)
+            if team.robot == "go2":
+                interface = (bridge.interface or _LOOPBACK).replace("{number}", number)
+                # Robots on one loopback, which real ones are not, have domains of their own.
+                domain = bridge.domain + index * (interface == _LOOPBACK)
+                opened[name] = Go2Emulator(domain, interface, seed)
+            else:
+                text = bridge.endpoint.replace("{number}", number)
+                here = parse_address(text, "bridge.endpoint", Address("", 0))
+                if not here.port:
+                    cause = (
+                        "an emulated robot is not at the address of a real one: deploy/desk.toml"
+                    )
+                    raise ConfigError("bridge.endpoint", "nothing", "HOST:PORT", cause)
+                opened[name] = UdpEmulator(CODECS[team.robot], here, seed)
+            stack.callback(opened[name].close)
         stack.pop_all()
-    return boards
-
-
-def _open_board(config: Config, index: int) -> Board:
-    kind, bridge, number = config.team.robot, config.bridge, str(index + 1)
-    seed = (config.world.seed, _STREAM, index)
-    if kind == "go2":
-        interface = (bridge.interface or _LOOPBACK).replace("{number}", number)
-        # Robots on one loopback, which real ones are not, have domains of their own.
-        return Go2Board(bridge.domain + index * (interface == _LOOPBACK), interface, seed)
-    text = bridge.endpoint.replace("{number}", number)
-    here = parse_address(text, "bridge.endpoint", Address("", 0))
-    if not here.port:
-        cause = "an emulated robot is not at the address of a real one: see deploy/desk.toml"
-        raise ConfigError("bridge.endpoint", "nothing", "HOST:PORT", cause)
-    return UdpBoard(CODECS[kind], here, seed)
+    return opened

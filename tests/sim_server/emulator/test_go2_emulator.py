@@ -15,11 +15,10 @@ from quadriga.shared.config.bridge import BridgeConfig
 from quadriga.shared.config.load import load
 from quadriga.shared.messages import Command
 from quadriga.shared.runtime.clock import monotonic, sleep
-from quadriga.shared.unitree.packets import pressed_buttons
-from quadriga.sim_server.emulator.board import Go2Board, RobotStatus
 from quadriga.sim_server.emulator.link import LinkFaults
+from quadriga.sim_server.emulator.robot_emulator import Go2Emulator
 from quadriga.sim_server.world.world import World
-from tests.bridges.robots import config_of, holding, pressing
+from tests.bridges.robots import config_of, holding
 
 WAIT = 10.0  # s
 TARGETS = holding(config_of("go2"), mode=np.ones(12, np.uint8))
@@ -29,7 +28,7 @@ class Bench:
     """A robot in a thread of its own, whose ticks go on, and a bridge's driver."""
 
     def __init__(self, domain: int) -> None:
-        self.robot = Go2Board(domain, "lo", seed=(3,))
+        self.robot = Go2Emulator(domain, "lo", seed=(3,))
         self._state = World(load(overrides={"team.robots": 1})).states()["r1"]
         self._over = threading.Event()
         self.command: Command | None = None
@@ -77,7 +76,7 @@ def hasten(patch: pytest.MonkeyPatch) -> None:
     """Have robots and drivers take less time than real ones need."""
     for name in ("bridges.drivers._STILL_S", "bridges.drivers._WATCHED"):
         patch.setattr(f"quadriga.{name}", 0.1)
-    patch.setattr("quadriga.sim_server.emulator.board._MOTION_MS", 10)
+    patch.setattr("quadriga.sim_server.emulator.robot_emulator._MOTION_MS", 10)
 
 
 @pytest.fixture
@@ -117,15 +116,3 @@ def test_damaged_structs_are_counted_on_both_sides(bench: Bench) -> None:
         return bench.robot.malformed > 3 and bench.driver.counters["malformed"] > 3
 
     wait_until(counted)
-
-
-def test_buttons_and_battery_reach_the_bridge(bench: Bench) -> None:
-    bench.robot.status = RobotStatus(charge=8.0, remote=pressing("L2", "B"))
-
-    def seen() -> bool:
-        report = bench.driver.receive()
-        if report is None or report.battery is None:
-            return False
-        return pressed_buttons(report.remote) == {"L2", "B"} and report.battery.charge == 8
-
-    wait_until(seen)
