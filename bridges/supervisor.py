@@ -35,7 +35,7 @@ from quadriga.bridges.postures import (
     tracking_error,
 )
 from quadriga.shared.codes import with_detail
-from quadriga.shared.config.bridge import BridgeConfig
+from quadriga.shared.config.sections import BridgeConfig
 from quadriga.shared.messages import Command
 from quadriga.shared.robots.conventions import JOINT_NAMES, N_JOINTS, Array
 from quadriga.shared.robots.motions import Motion, posture_at, way_down, way_up

@@ -11,9 +11,8 @@ import numpy as np
 from quadriga.agents.predictor.episode import Layout, everyone, team_layout
 from quadriga.agents.predictor.periodic import PeriodicFactors
 from quadriga.shared.config.sections import Config
-from quadriga.shared.config.yokes import neighbours
 from quadriga.shared.errors import PredictorError
-from quadriga.shared.robots.conventions import N_FORCES, N_OUTPUTS, Array
+from quadriga.shared.robots.conventions import N_FORCES, N_OUTPUTS, Array, neighbours
 
 # Keys of the controller that act only in a failure and do not change the plant that is fitted.
 _SAFETY_KEYS: Final = ("damping", "fall_tilt", "max_failures")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
@@ -24,40 +24,34 @@ class TerrainKind:
     name: str
     builder: str
     text: str
-    _: KW_ONLY
     meaning: str = ""
     height_key: str = "terrain_height"
     least_height: float = 0.0
 
 
+_H: Final = "up to {terrain_height:g} m"
+_STAIRS: Final = (
+    "stairs, {stairs_count} steps of {stairs_rise:g} m up and down, {stairs_run:g} m deep"
+)
 _ROWS: Final = (
     TerrainKind("flat", "", "flat"),
-    TerrainKind("boxes", "ground:build_blocks", "boxes up to {terrain_height:g} m"),
-    TerrainKind(
-        "gravel", "ground:build_gravel", "gravel up to {terrain_height:g} m", meaning="fixed stones"
-    ),
-    TerrainKind(
-        "heightfield", "ground:build_smooth_field", "heightfield up to {terrain_height:g} m"
-    ),
+    TerrainKind("boxes", "ground:build_blocks", f"boxes {_H}"),
+    TerrainKind("gravel", "ground:build_gravel", f"gravel {_H}", "fixed stones"),
+    TerrainKind("heightfield", "ground:build_smooth_field", f"heightfield {_H}"),
     TerrainKind(
         "pebbles",
         "pebbles:build_pebbles",
-        "pebbles up to {terrain_height:g} m",
-        meaning="a layer of loose stones",
+        f"pebbles {_H}",
+        "a layer of loose stones",
         least_height=0.005,  # the ground holds millions of smaller stones
     ),
-    TerrainKind(
-        "slope",
-        "ground:build_ramps",
-        "slope of {slope:g} deg up to {terrain_height:g} m",
-        meaning="ramps up and down",
-    ),
+    TerrainKind("slope", "ground:build_ramps", "slope of {slope:g} deg " + _H, "ramps up and down"),
     TerrainKind(
         "stairs",
         "ground:build_stairs",
         "stairs, {stairs_count} steps of {stairs_rise:g} m up and down, {stairs_run:g} m deep",
-        meaning="up, a landing, and down again",
-        height_key="stairs_rise",
+        "up, a landing, and down again",
+        "stairs_rise",
     ),
 )
 TERRAINS: Final[Mapping[str, TerrainKind]] = MappingProxyType({row.name: row for row in _ROWS})

@@ -10,9 +10,8 @@ from typing import Final
 import mujoco
 import numpy as np
 
-from quadriga.shared.config.sections import Config
+from quadriga.shared.config.sections import Config, WorldConfig
 from quadriga.shared.config.terrains import TERRAINS
-from quadriga.shared.config.world import WorldConfig
 from quadriga.shared.robots.conventions import Array
 from quadriga.sim_server.terrain.relief import (
     GROUND_OF_STONES,

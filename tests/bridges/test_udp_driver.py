@@ -11,7 +11,7 @@ import pytest
 
 from quadriga.bridges.drivers import UdpDriver
 from quadriga.bridges.plant import RobotPlant
-from quadriga.shared.config.bridge import BridgeConfig
+from quadriga.shared.config.sections import BridgeConfig
 from quadriga.shared.errors import BridgeError, CheckError, ConfigError
 from quadriga.shared.unitree.codecs import A1, GO1
 from quadriga.shared.unitree.packets import OFF, SERVO, RobotReport

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quadriga.shared.config.motors import MotorsConfig
+from quadriga.shared.config.sections import MotorsConfig
 from quadriga.shared.messages import Command
 from quadriga.shared.robots.a1 import A1
 from quadriga.shared.robots.conventions import N_JOINTS, Array

@@ -8,9 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quadriga.shared.config.yokes import yoke_pairs
 from quadriga.shared.robots.a1 import A1
-from quadriga.shared.robots.conventions import FOOT_FRAMES, JOINT_NAMES, N_JOINTS
+from quadriga.shared.robots.conventions import FOOT_FRAMES, JOINT_NAMES, N_JOINTS, yoke_pairs
 from quadriga.shared.robots.pinocchio_model import build_pinocchio_model
 from quadriga.shared.robots.registry import ROBOTS
 from quadriga.sim_server.terrain.relief import TERRAIN_CONTACT
