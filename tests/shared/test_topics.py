@@ -10,8 +10,8 @@ from quadriga.shared.config.load import load
 from quadriga.shared.config.timing import max_ages, periods
 from quadriga.shared.errors import MessageError
 from quadriga.shared.messages import Flat, Message
-from quadriga.shared.messages_page import to_markdown
 from quadriga.shared.runtime.places import SOURCE
+from quadriga.shared.schema import to_markdown
 from quadriga.shared.topics import (
     AGENT_EVENT,
     CONFIGURED,
