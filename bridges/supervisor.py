@@ -45,8 +45,8 @@ from quadriga.shared.unitree.packets import (
     PROTECTED,
     MotorTargets,
     RobotReport,
-    are_pressed,
     parse_buttons,
+    pressed_buttons,
 )
 
 TRACKING_ERROR: Final = "tracking-error"  # why a test of joints is stopped
@@ -263,7 +263,7 @@ class Supervisor:
         config, report, mode = self._config, inputs.report, state.mode
         if inputs.estop:
             return with_detail("estop", inputs.estop)
-        if are_pressed(report.remote, self._stop_buttons):
+        if self._stop_buttons <= pressed_buttons(report.remote):
             return with_detail("remote", config.stop_buttons)
         # Once the watchdog has damped the motors, it is who else has commanded them.
         if inputs.stall > config.damp_ms and mode is not BridgeMode.PASSIVE:

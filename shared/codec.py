@@ -87,9 +87,10 @@ def decode(payload: bytes, kind: type[M]) -> M:
         missing = sorted(names - body.keys())
         unknown = sorted(str(key) for key in body.keys() - names)
         raise _error(kind, f"{missing=} {unknown=}", "exactly the fields of the type")
-    arrays = _read_arrays(kind, layout.shapes, body)
-    plain = {name: _check(kind, name, *of, body[name]) for name, of in layout.plain.items()}
-    return kind(**plain, **arrays)
+    values: dict[str, Any] = dict(_read_arrays(kind, layout.shapes, body))
+    for name, of in layout.plain.items():
+        values[name] = _check(kind, name, *of, body[name])
+    return kind(**values)
 
 
 def envelope(payload: bytes) -> tuple[int, int] | None:
@@ -144,7 +145,7 @@ class _Layout:
 
 
 @cache
-def _layout(kind: type[Message]) -> _Layout:
+def _layout(kind: Any) -> _Layout:
     return _Layout(kind)
 
 

@@ -26,7 +26,6 @@ _SIZES: Final = {1: 1, 2: 2, 4: 3, 8: 4}  # code of a number by its bytes
 _KINDS: Final = {"u": 0, "i": 4, "f": 2}  # flag of a number by numpy's kind
 _SEQUENCE_OF_BYTES: Final = _ADDRESS | _SEQUENCE | _SIZES[1] << 8
 _THERE_ALREADY: Final = -4  # DDS_RETCODE_PRECONDITION_NOT_MET, of a domain
-_UNREAD: Final = 2 | 4 | 8 | 16  # any view, instances that are alive, samples not read
 _CONFIG: Final = (
     '<CycloneDDS><Domain Id="any"><General><Interfaces>'
     '<NetworkInterface name="{interface}" priority="default" multicast="default"/>'
@@ -131,28 +130,17 @@ def operations(layout: np.dtype[Any], base: int = 0) -> list[int]:
     On the wire that is the same: XCDR1 has neither padding of structs nor marks between them.
     """
     ops = list[int]()
-    for name in layout.names or ():
-        field, offset = _field_of(layout, name)
-        at = base + int(offset)
-        one, shape = field.subdtype or (field, ())
-        count = int(np.prod(shape)) if shape else 1
-        if one.names:
+    for field, offset, *_ in (layout.fields or {}).values():
+        at, count = base + offset, int(np.prod(field.shape))
+        if field.base.names:
             for k in range(count):
-                ops += operations(one, at + k * one.itemsize)
-            continue
-        kind, size = _KINDS[one.kind], _SIZES[one.itemsize]
-        if shape:
+                ops += operations(field.base, at + k * field.base.itemsize)
+        elif field.shape:
+            kind, size = _KINDS[field.base.kind], _SIZES[field.base.itemsize]
             ops += [_ADDRESS | _ARRAY | size << 8 | kind, at, count]
         else:
-            ops += number_at(at, one.kind, one.itemsize)
+            ops += number_at(at, field.kind, field.itemsize)
     return ops
-
-
-def _field_of(layout: np.dtype[Any], name: str) -> tuple[np.dtype[Any], int]:
-    if layout.fields is None:
-        raise TypeError(f"{layout} is no struct")
-    field, offset, *_ = layout.fields[name]
-    return field, offset
 
 
 def number_at(offset: int, kind: str, size: int) -> list[int]:
@@ -168,6 +156,15 @@ def string_at(offset: int) -> list[int]:
 def bytes_at(offset: int) -> list[int]:
     """How to find a sequence of bytes: maximum, length, buffer, whether it is ours to free."""
     return [_SEQUENCE_OF_BYTES, offset]
+
+
+def take(library: Any, reader: int, sample: Any, info: SampleInfo) -> bool:
+    """Fill `sample` and `info` with the oldest sample that has not been taken, if there is one."""
+    samples = (c.c_void_p * 1)(c.addressof(sample))
+    while library.dds_take(reader, c.addressof(samples), c.addressof(info), 1, 1) > 0:
+        if info.valid_data:  # else a writer has left
+            return True
+    return False
 
 
 def describe_topic(typename: str, size: int, alignment: int, ops: Sequence[int]) -> Any:
@@ -283,9 +280,9 @@ LOW_STATES: Final = StructTopic("rt/lowstate", "unitree_go::msg::dds_::LowState_
 
 
 def _declare(participant: DdsParticipant, topic: StructTopic) -> int:
-    layout = topic.layout
-    size, alignment, ops = layout.itemsize, layout.alignment, operations(layout)
-    return participant.topic(topic.name, topic.typename, size, alignment, ops)
+    name, typename, layout = topic
+    ops = operations(layout)
+    return participant.topic(name, typename, layout.itemsize, layout.alignment, ops)
 
 
 class StructReader:
@@ -306,16 +303,12 @@ class StructReader:
         self._library = participant.library
         self.handle = participant.reader(_declare(participant, topic), of_others=of_others)
         self._sample = c.create_string_buffer(topic.layout.itemsize)
-        self._samples = (c.c_void_p * 1)(c.addressof(self._sample))
         self._info = SampleInfo()
 
     def take(self) -> bytes | None:
         """The oldest sample that has not been taken; None if there is none."""
-        where = c.addressof(self._samples), c.addressof(self._info)
-        while self._library.dds_take(self.handle, *where, 1, 1) > 0:
-            if self._info.valid_data:  # else a writer has left
-                return self._sample.raw
-        return None
+        found = take(self._library, self.handle, self._sample, self._info)
+        return self._sample.raw if found else None
 
     @property
     def writer(self) -> int:

@@ -81,15 +81,14 @@ def test_a_program_of_ones_own_takes_the_place_of_the_planner(tmp_path: Path) ->
 def test_every_key_refuses_another_type(section: str) -> None:
     for item in fields(getattr(Config(), section)):
         default: Any = item.default
-        wrong: list[Any] = [None, {"a": 1}, [[]]]
-        wrong += {
+        others: dict[type, list[Any]] = {
             int: [1.5, "1"],
             float: ["1", math.nan, math.inf, True, 10**400],
             bool: [1, "true"],
             str: [1, True, "line\nbreak"],
             tuple: [[*default, 1.0], default[:-1]] if type(default) is tuple else [],
-        }[type(default)]
-        for value in wrong:
+        }
+        for value in (None, {"a": 1}, [[]], *others[type(default)]):
             assert refused({f"{section}.{item.name}": value}) == f"{section}.{item.name}"
 
 
