@@ -12,8 +12,7 @@ from typing import Final
 
 from quadriga.shared.config.endpoints import host_and_port
 from quadriga.shared.errors import ConfigError, system_reason
-from quadriga.shared.runtime.clock import utc_now
-from quadriga.shared.security.certificates import EXPIRED, NOT_YET_VALID, TlsFiles, read_certificate
+from quadriga.shared.security.certificates import EXPIRED, NOT_YET_VALID, TlsFiles
 
 TRUSTED: Final = "trusted"
 UNREACHABLE: Final = "unreachable"  # nobody answers there
@@ -31,7 +30,7 @@ CAUSES: Final = {
     NOT_YET_VALID: "a clock that is wrong, here or where it was made",
     UNTRUSTED: "another authority's, or the router was not made for this address: "
     "`quadriga certs make --router HOST`",
-    REFUSED: "our certificate has expired or is another authority's: `quadriga certs show`",
+    REFUSED: "ours has expired, is not yet valid or another authority's: `quadriga certs show`",
 }
 
 
@@ -54,12 +53,7 @@ def shake_hands(endpoint: str, files: TlsFiles) -> Handshake:
         ConfigError: the endpoint is malformed, or the files cannot be used.
     """
     host, port = host_and_port(endpoint)
-    context, now = _context(files), utc_now()
-    held = read_certificate(files.certificate)
-    if held.state(now) == NOT_YET_VALID:  # the other side would say that it has expired
-        return Handshake(
-            NOT_YET_VALID, f"ours is valid from {held.begins:%F %T}, now is {now:%F %T}"
-        )
+    context = _context(files)
     try:
         with (
             socket.create_connection((host, port), _TIMEOUT) as link,
@@ -83,12 +77,8 @@ def _context(files: TlsFiles) -> ssl.SSLContext:
         context.load_verify_locations(files.authority)
         context.load_cert_chain(files.certificate, files.key)
     except OSError as error:  # of ssl's own kind too
-        raise ConfigError(
-            str(files.certificate.parent),
-            system_reason(error),
-            "a certificate, its key and the authority's certificate",
-            "`quadriga certs show`",
-        ) from None
+        folder, expected = str(files.certificate.parent), "a certificate, its key, the authority's"
+        raise ConfigError(folder, system_reason(error), expected, "`quadriga certs show`") from None
     return context
 
 
