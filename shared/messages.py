@@ -58,10 +58,8 @@ class Message:
 class Flat(Message):
     """A message whose arrays all have fixed sizes: they are read-only views of one `row`.
 
-    Made of arrays like any other, or with `from_row`, in the order of its fields.
-
-    Attributes:
-        row: all numbers, float64; not to be changed.
+    Made of arrays like any other, or with `from_row`, in the order of its fields. The row is
+    float64 and not to be changed.
     """
 
     __slots__ = ("row",)
