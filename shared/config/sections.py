@@ -17,6 +17,7 @@ SIMULATED: Final = "mujoco"  # the kind of plant that is a simulated world
 BRIDGED: Final = "robots"  # the kind that is robots of their own, each behind a bridge
 CONFIGURED: Final = "configured"  # the operator asks for what [reference] says
 BY_HAND: Final = "hand"  # for what a person asks
+Numbers = tuple[float, ...]
 
 
 def number(default: Any, unit: str, low: float, high: float, doc: str) -> Any:
@@ -82,9 +83,7 @@ class TeamConfig:
     resume_after: float = number(
         1.0, "s", 0.2, 4.0, "how long all inputs must have been whole before a robot walks again"
     )
-    plant: str = text(
-        SIMULATED, "mujoco; robots: real ones behind bridges; or a kind that a package adds"
-    )
+    plant: str = text(SIMULATED, "mujoco; robots: real ones behind bridges; or a plug-in's kind")
     plant_per_robot: bool = flag(False, "every robot has a plant of its own; false: one for all")
     agent_command: str = text(
         "",
@@ -108,18 +107,14 @@ class BusConfig:
         "where the sim server, or plant_r1, listens (peer) or the router is (client); off the "
         "loopback tls/HOST:PORT",
     )
-    listen: str = text(
-        "tcp/127.0.0.1:0", "peer mode: where every other process listens; port 0: any free one"
-    )
+    listen: str = text("tcp/127.0.0.1:0", "peer: where all others listen; port 0: any free one")
     certificates: str = text(
         "certs", "tls/HOST:PORT: folder with a folder for each process, see docs/security.md"
     )
     plaintext: bool = flag(
         False, "permit others than tls off the loopback: whoever reaches them commands the robots"
     )
-    barrier_timeout: float = number(
-        60.0, "s", 0.1, 3600.0, "how long to wait for all processes before giving up"
-    )
+    barrier_timeout: float = number(60.0, "s", 0.1, 3600.0, "how long to wait for all processes")
     reconnect_timeout: float = number(
         30.0,
         "s",
@@ -141,18 +136,14 @@ class BusConfig:
 class WorldConfig:
     """The simulated world and its seeded disturbances."""
 
-    mode: str = choice(
-        ("lockstep", "realtime"), "lockstep waits for every command; realtime follows the clock"
-    )
+    mode: str = choice(("lockstep", "realtime"), "lockstep waits for all commands")
     seed: int = number(0, "-", 0, 2**31, "seed of terrain, noise and everything else random")
     duration: float = number(20.0, "s", 0.5, 3600.0, "world time to walk")
     scenario: str = text("", "name of the scenario these keys come from: a label only")
     initial_posture: str = choice(
         ("standing", "lying"), "how simulated robots begin; lying: on their feet with folded legs"
     )
-    scatter: float = number(
-        0.0, "m", 0.0, 0.1, "how far a robot may start off its place along x and y, seeded"
-    )
+    scatter: float = number(0.0, "m", 0.0, 0.1, "how far off its place a robot may start, seeded")
     terrain: str = choice(tuple(TERRAINS), f"kind of ground; {terrain_meanings()}")
     terrain_height: float = number(
         0.05, "m", 0.0, 0.3, "greatest height; of pebbles that of the largest, at least 0.005"
@@ -178,24 +169,16 @@ class WorldConfig:
         "pushes 'robot:force[N]:direction[deg]:start[s]:duration[s]' separated by commas; "
         "robot may be 'all'; direction 0 is forward, 90 is left",
     )
-    push_force: float = number(
-        0.0, "N", 0.0, 5000.0, "seeded series of sideways pushes on the robots in turn; 0: none"
-    )
-    push_spread: float = number(
-        0.0, "1", 0.0, 1.0, "share of push_force by which a push may be weaker or stronger, seeded"
-    )
-    push_every: float = number(
-        3.0, "s", 0.1, 600.0, "time between two pushes, and before the first"
-    )
+    push_force: float = number(0.0, "N", 0.0, 5000.0, "seeded series of pushes in turn; 0: none")
+    push_spread: float = number(0.0, "1", 0.0, 1.0, "spread of push_force, seeded")
+    push_every: float = number(3.0, "s", 0.1, 600.0, "time between two pushes, before the first")
     push_duration: float = number(0.2, "s", 1e-3, 10.0, "duration of each push of the series")
     weak_motor: str = text(
         "",
         "motors that weaken: 'robot:joint:start[s]' separated by commas; joint as FL_calf, calf or "
         "FL, either may be 'any', and what is left open is drawn from the seed",
     )
-    weak_share: float = number(
-        0.6, "1", 0.0, 1.0, "share of its torque that a weak motor still gives"
-    )
+    weak_share: float = number(0.6, "1", 0.0, 1.0, "share of its torque that a weak motor gives")
     faults: str = text(
         "",
         "faulty sensors and motors, 'robot/component kind start[s] [duration[s]]' separated by "
@@ -210,12 +193,8 @@ class WorldConfig:
         "lockstep: a robot silent longer is put into damping; with a planner at least 1 s more "
         "than planner.peer_timeout",
     )
-    command_hold_ms: int = number(
-        20, "ms", 1, 1000, "realtime: a command older than this is replaced by holding"
-    )
-    command_damp_ms: int = number(
-        200, "ms", 1, 10000, "realtime: a command older than this is lost, see lost_command"
-    )
+    command_hold_ms: int = number(20, "ms", 1, 1000, "realtime: an older command is held")
+    command_damp_ms: int = number(200, "ms", 1, 10000, "realtime: an older command is lost")
     lost_command: str = choice(
         ("lower", "damp"),
         "simulated robots whose commands are lost: lower: led down slowly and then damped, which "
@@ -261,9 +240,7 @@ class SensorsConfig:
     )
     foot_force: float = number(0.05, "N", 0.0, 50.0, "foot force noise")
     foot_scale: float = number(12.5, "1/N", 0.01, 50.0, "counts per N, the median of all feet")
-    foot_scale_spread: float = number(
-        0.06, "1", 0.0, 2.0, "of the logarithm of a foot's counts per N, drawn once"
-    )
+    foot_scale_spread: float = number(0.06, "1", 0.0, 2.0, "of the logarithm of that, drawn once")
     foot_offset: float = number(120.0, "1", -1e4, 1e4, "counts of an unloaded foot, mean of all")
     foot_bias: float = number(30.0, "1", 0.0, 1e4, "how far each foot's differ from that, once")
     foot_drift: float = number(1.5, "1/√s", 0.0, 1e3, "random walk of that, counts after 1 s")
@@ -278,25 +255,15 @@ class SensorsConfig:
 class MotorsConfig:
     """Motors and joints: what the world simulates, and what of it the low level's model has."""
 
-    preset: str = choice(
-        ("realistic", "ideal"), "ideal: motors give at once what is commanded, within one limit"
-    )
+    preset: str = choice(("realistic", "ideal"), "ideal: no friction, inertia, delay, heat")
     torque_speed: bool = flag(True, "torque falls with the joint's speed, to zero at its limit")
-    friction: float = number(
-        0.4, "N·m", 0.0, 0.8, "dry friction of motor and gear; with it rotor_inertia must be true"
-    )
-    viscous_friction: float = number(
-        0.04, "N·m·s/rad", 0.0, 1.0, "friction of each joint that grows with its rate"
-    )
+    friction: float = number(0.4, "N·m", 0.0, 0.8, "dry friction; it needs rotor_inertia = true")
+    viscous_friction: float = number(0.04, "N·m·s/rad", 0.0, 1.0, "viscous friction of the joints")
     rotor_inertia: bool = flag(True, "the rotors' inertia, as joints feel it behind the gears")
-    bandwidth: float = number(
-        100.0, "Hz", 0.0, 1e4, "corner frequency of a motor's first-order lag; 0: none"
-    )
+    bandwidth: float = number(100.0, "Hz", 0.0, 1e4, "corner of a motor's first-order lag; 0: none")
     delay_ms: int = number(2, "ms", 0, 50, "time from a command until the motors act on it")
     hard_stops: bool = flag(True, "end stops give way by hardly anything; false: by hundredths")
-    heat_time: float = number(
-        300.0, "s", 0.0, 1e5, "thermal time constant; hot ones give continuous torque; 0: no heat"
-    )
+    heat_time: float = number(300.0, "s", 0.0, 1e5, "thermal time constant of motors; 0: no heat")
 
 
 @dataclass(frozen=True, slots=True)
@@ -335,24 +302,14 @@ class ControllerConfig:
     gamma_tau: float = number(1e2, "1", 0.0, 1e9, "gamma_1, weight of torques")
     gamma_force: float = number(1e3, "1", 0.0, 1e9, "gamma_2, weight of force errors")
     gamma_defect: float = number(1e6, "1", 1.0, 1e12, "gamma_3, weight of the defect")
-    tilt_length: float = number(
-        0.15, "m", 0.01, 10.0, "weight of the trunk's angular defect against its linear (paper: 1)"
-    )
-    swing_weight: float = number(
-        0.3, "1", 0.01, 10.0, "weight of the swing feet's defect against the trunk's (paper: 1)"
-    )
+    tilt_length: float = number(0.15, "m", 0.01, 10.0, "angular against linear defect (paper: 1)")
+    swing_weight: float = number(0.3, "1", 0.01, 10.0, "swing feet's against trunk's (paper: 1)")
     mu: float = number(0.6, "1", 0.05, 2.0, "friction coefficient the QP may use")
     mu_min: float = number(0.35, "1", 0.05, 2.0, "the least it uses, even while feet slide")
-    mu_slippery: float = number(
-        0.12, "1", 0.02, 2.0, "likewise, where the forces of sliding feet show less than mu_min"
-    )
-    mu_recovery: float = number(
-        2.0, "1/s", 0.0, 10.0, "rate at which it recovers after feet slid; below mu_min a tenth"
-    )
+    mu_slippery: float = number(0.12, "1", 0.02, 2.0, "likewise, where feet that slide show less")
+    mu_recovery: float = number(2.0, "1/s", 0.0, 10.0, "its rate of recovery; below mu_min a tenth")
     slip_load: float = number(20.0, "N", 0.0, 200.0, "slip detection ignores a foot with less")
-    slip_speed: float = number(
-        0.3, "m/s", 0.0, 5.0, "a stance foot faster than this slides: the QP uses less; 0: never"
-    )
+    slip_speed: float = number(0.3, "m/s", 0.0, 5.0, "a faster stance foot slides; 0: never")
     force_min: float = number(5.0, "N", 0.0, 50.0, "least normal force of a stance foot")
     kp_z: float = number(400.0, "1/s²", 0.0, 1e4, "height")
     kd_z: float = number(40.0, "1/s", 0.0, 1e3, "height rate")
@@ -381,49 +338,33 @@ class ControllerConfig:
     reaction_filter_ms: float = number(
         3.0, "ms", 0.5, 100.0, "time constant of both filters of the load by the joints' torques"
     )
-    calibration_time: float = number(
-        3.0, "s", 0.1, 1e4, "time constant of comparing foot sensors with the joints' torques"
-    )
+    calibration_time: float = number(3.0, "s", 0.1, 1e4, "time constant of foot sensors' fit")
     lost_contact_ms: int = number(5, "ms", 1, 100, "stance without force until it descends")
     descent_speed: float = number(0.8, "m/s", 0.0, 3.0, "speed of a descending stance foot")
     reject_side_contacts: bool = flag(
         True, "a foot stopped from the side is no contact, nor an early one that bears no load"
     )
-    liftoff_hold_ms: int = number(
-        0, "ms", 0, 1000, "how long lift-off waits for contact of the feet that are to stand"
-    )
-    reflex_ms: int = number(
-        10, "ms", 0, 100, "a stopped swing foot rises until it has been free for this; 0: never"
-    )
+    liftoff_hold_ms: int = number(0, "ms", 0, 1000, "how long lift-off waits for contact")
+    reflex_ms: int = number(10, "ms", 0, 100, "a stopped swing foot rises until free for this")
     reflex_lift: float = number(1.0, "m/s", 0.0, 3.0, "its upward speed")
     track_sinking_trunk: bool = flag(
         True, "a descending foot follows a sinking trunk; desired feet stay within reach"
     )
     flight: bool = flag(True, "without contact the desired motion of the trunk is free fall")
-    load_time: float = number(
-        1.0, "s", 0.0, 100.0, "time constant of the estimate of the external load; 0: none"
-    )
-    swing_delay: float = number(
-        0.0, "1", 0.0, 0.5, "share of swing in which a foot rises before it goes forward"
-    )
+    load_time: float = number(1.0, "s", 0.0, 100.0, "time constant of the external load; 0: none")
+    swing_delay: float = number(0.0, "1", 0.0, 0.5, "share of swing in which a foot only rises")
     swing_acceleration: float = number(
         100.0, "m/s²", 1.0, 1e4, "a late swing has a foothold so near that it needs no more"
     )
     ground_filter_ms: float = number(50.0, "ms", 0.0, 1e3, "filter of the ground height")
-    swing_height: float = number(
-        0.09, "m", 0.01, 0.2, "apex above the highest foothold (paper: above the ground)"
-    )
+    swing_height: float = number(0.09, "m", 0.01, 0.2, "apex above the higher foothold")
     raibert_gain: float = number(0.03, "s", 0.0, 0.5, "foothold per velocity error")
     foothold_inwards: float = number(
         0.1, "m", 0.0, 10.0, "how far inwards of its hip a foothold may lie; times 1 + load / mass"
     )
-    damping: float = number(
-        2.0, "N·m·s/rad", 0.1, 10.0, "of joints in mode damping, and while QPs fail"
-    )
+    damping: float = number(2.0, "N·m·s/rad", 0.1, 10.0, "in mode damping, or while QPs fail")
     fall_tilt: float = number(0.9, "rad", 0.3, 1.5, "a tilt beyond this is a fall: damping")
-    max_failures: int = number(
-        20, "ms", 1, 1000, "failed QPs in a row before damping; until then the last torques"
-    )
+    max_failures: int = number(20, "ms", 1, 1000, "failed QPs in a row before damping")
 
 
 @dataclass(frozen=True, slots=True)
@@ -447,9 +388,7 @@ class PlannerConfig:
         "team: that of the whole team, with the new plan mixed with its last one: plans approach "
         "a central planner's whatever the coupling",
     )
-    compensation: bool = flag(
-        True, "distributed: bring peers' windows and plans forward by their age"
-    )
+    compensation: bool = flag(True, "distributed: bring peers' plans forward by their age")
     damping: float = number(
         -1.0,
         "1",
@@ -460,9 +399,7 @@ class PlannerConfig:
         "'team' 0 and -1 are the share with which the plans converge fastest",
     )
     exchanges: int = number(0, "-", 0, 8, "distributed: best responses to plans of the same step")
-    latency_ms: int = number(
-        8, "ms", 0, 100, "a plan of data at t takes effect at t + this, ≤ 10·(N − applied)"
-    )
+    latency_ms: int = number(8, "ms", 0, 100, "until a plan takes effect, ≤ 10·(N − applied)")
     lambda_g: float = number(1e5, "1", 1e-9, 1e12, "deepc: weight of ‖g‖²")
     lambda_sigma: float = number(1e5, "1", 1e-9, 1e15, "deepc: weight of ‖σ‖²")
     interface: str = choice(
@@ -477,24 +414,24 @@ class PlannerConfig:
     N: int = number(25, "samples", 4, 100, "control horizon")
     T_ini: int = number(10, "samples", 2, 50, "estimation horizon")
     applied: int = number(4, "samples", 1, 20, "samples applied before the next plan")
-    Q: tuple[float, ...] = number(
+    Q: Numbers = number(
         (1e6, 1e5, 1e5, 2e5, 2e5, 2e3), "-", 0.0, inf, "weights of z, vx, vy, roll, pitch, wz"
     )
-    R: tuple[float, ...] = number((0.2, 0.2, 0.05), "-", 1e-9, inf, "weights of fx, fy, fz")
+    R: Numbers = number((0.2, 0.2, 0.05), "-", 1e-9, inf, "weights of fx, fy, fz")
     mu: float = number(0.6, "1", 0.05, 2.0, "friction coefficient of the planned forces")
     force_min: float = number(0.0, "N", 0.0, 50.0, "least planned normal force")
-    deviation_max: tuple[float, ...] = number(
+    deviation_max: Numbers = number(
         (20.0, 20.0, 60.0), "N", 0.0, inf, "largest planned deviation from the nominal force"
     )
     output_bounds: str = choice(("none", "hard"), "planned outputs are bounded by output_max")
-    output_max: tuple[float, ...] = number(
+    output_max: Numbers = number(
         (0.03, 0.4, 0.3, 0.15, 0.15, 0.8),
         "m, m/s, m/s, rad, rad, rad/s",
         1e-6,
         inf,
         "largest planned deviation of z, vx, vy, roll, pitch, wz from what is commanded",
     )
-    trust_range: tuple[float, ...] = number(
+    trust_range: Numbers = number(
         (0.06, 0.5, 0.25, 2.0),
         "m, m/s, rad, rad/s",
         1e-6,
@@ -504,15 +441,9 @@ class PlannerConfig:
     solver: str = choice(
         ("daqp", "osqp"), "daqp: the closed form, Newton's method at limits of forces, else DAQP"
     )
-    max_peer_age: int = number(
-        3, "planning steps", 1, 25, "a peer's plan older than this is no longer shifted"
-    )
-    hold_steps: int = number(
-        5, "planning steps", 0, 250, "a lost peer's terms are held this long, then stop"
-    )
-    peer_timeout: float = number(
-        5.0, "s wall", 0.01, 10.0, "lockstep: longest wait for a peer's plan"
-    )
+    max_peer_age: int = number(3, "planning steps", 1, 25, "an older plan of a peer is not shifted")
+    hold_steps: int = number(5, "planning steps", 0, 250, "how long a lost peer's terms are held")
+    peer_timeout: float = number(5.0, "s wall", 0.01, 10.0, "lockstep: wait for a peer's plan")
 
     @property
     def option_values(self) -> Mapping[str, float]:
@@ -524,21 +455,13 @@ class PlannerConfig:
 class IdentificationConfig:
     """Data collection and the predictor's fit and gates."""
 
-    preset: str = choice(
-        ("usual", "paper"), "paper: the pseudo-inverse, whatever its best-response radius"
-    )
-    seconds: float = number(
-        0.0, "s", 0.0, 3600.0, "world time of training data; 0: chosen by the size of the team"
-    )
-    disturbed: float = number(
-        0.25, "1", 0.0, 10.0, "share of this in addition, without noise, on boxes, under pushes"
-    )
+    preset: str = choice(("usual", "paper"), "paper: the pseudo-inverse, whatever its radius")
+    seconds: float = number(0.0, "s", 0.0, 3600.0, "of training data; 0: by the size of the team")
+    disturbed: float = number(0.25, "1", 0.0, 10.0, "share of this more, on boxes, under pushes")
     held_out: float = number(8.0, "s", 2.0, 600.0, "world time held out of the fit")
     episode: float = number(10.5, "s", 3.0, 600.0, "length of one episode")
-    noise: tuple[float, ...] = number(
-        (3.0, 3.0, 5.0), "N", 0.0, inf, "force noise (std) fx, fy, fz of each foot for itself"
-    )
-    wrench_noise: tuple[float, ...] = number(
+    noise: Numbers = number((3.0, 3.0, 5.0), "N", 0.0, inf, "std of forces, each foot for itself")
+    wrench_noise: Numbers = number(
         (16.0, 16.0, 8.0, 14.0, 8.0),
         "N",
         0.0,
@@ -547,9 +470,9 @@ class IdentificationConfig:
         "z, vertical couple, horizontal couple",
     )
     noise_hold_ms: int = number(20, "ms", 10, 500, "how long one draw of noise is held")
-    vx: tuple[float, ...] = number((-0.2, 0.7), "m/s", -2.0, inf, "range of random forward speeds")
-    vy: tuple[float, ...] = number((-0.2, 0.2), "m/s", -2.0, inf, "range of random sideways speeds")
-    wz: tuple[float, ...] = number((-0.3, 0.3), "rad/s", -2.0, inf, "range of random yaw rates")
+    vx: Numbers = number((-0.2, 0.7), "m/s", -2.0, inf, "range of random forward speeds")
+    vy: Numbers = number((-0.2, 0.2), "m/s", -2.0, inf, "range of random sideways speeds")
+    wz: Numbers = number((-0.3, 0.3), "rad/s", -2.0, inf, "range of random yaw rates")
     hold: float = number(1.5, "s", 0.1, 60.0, "how long a random speed is held")
     seed: int = number(1000, "-", 0, 2**31, "seed of the collection")
     predictor: str = choice(
@@ -567,15 +490,9 @@ class IdentificationConfig:
         ("all", "yoked"), "yoked: robots that are not yoked to each other are taken as uncoupled"
     )
     ridge: float = number(1e-3, "1", 1e-12, 1e3, "ridge per data column")
-    block_weight: float = number(
-        160.0, "1", 1.0, 1e4, "extra penalty weight w (as w²) on the columns of peers"
-    )
-    order_per_robot: int = number(
-        12, "states", 1, 100, "system order n = this · robots, for T ≥ (m+1)(T_ini+N+n)−1"
-    )
-    max_radius: float = number(
-        1.0, "1", 0.01, 10.0, "gate: spectral radius of the best-response map"
-    )
+    block_weight: float = number(160.0, "1", 1.0, 1e4, "penalty weight w (as w²) of peers' columns")
+    order_per_robot: int = number(12, "states", 1, 100, "system order n = this · robots")
+    max_radius: float = number(1.0, "1", 0.01, 10.0, "gate: radius of the best-response map")
     max_peers_harm: float = number(
         0.02,
         "1",
@@ -584,8 +501,8 @@ class IdentificationConfig:
         "gate: share by which the predicted effect of peers may raise the squared error of an "
         "output on held-out data; beyond its 95 % interval it is refused",
     )
-    gain_range: tuple[float, ...] = number(
-        (0.3, 2.0), "1", -10.0, inf, "gate: predicted over physical height response"
+    gain_range: Numbers = number(
+        (0.3, 2.0), "1", -10.0, inf, "gate: height gain, predicted / physical"
     )
 
 
@@ -609,9 +526,7 @@ class ReferenceConfig:
         "stands, see docs/driving.md",
     )
     page_port: int = number(0, "-", 0, 65535, "hand: port of the page to drive from; 0: any free")
-    trace_shift: float = number(
-        0.0, "s", 0.0, 3600.0, "the trace begins at a time from 0 to this, seeded"
-    )
+    trace_shift: float = number(0.0, "s", 0.0, 3600.0, "the trace begins within this, seeded")
 
 
 @dataclass(frozen=True, slots=True)
@@ -656,24 +571,14 @@ class BridgeConfig:
         0, "ms", 0, 2, "between two states, and two commands; 0: 1 for A1 and Go1, 2 for Go2"
     )
     stop_buttons: str = text("L2+B", "buttons of the remote control that stop the robot")
-    torque_share: float = number(
-        0.9, "1", 0.05, 1.0, "share of each motor's greatest torque that may be asked for"
-    )
+    torque_share: float = number(0.9, "1", 0.05, 1.0, "share of a motor's greatest torque")
     torque_rate: float = number(8.0, "N·m/ms", 0.1, 100.0, "how fast that torque may change")
-    speed_share: float = number(
-        0.95, "1", 0.1, 1.5, "share of a joint's greatest speed beyond which it is too fast"
-    )
-    speed_ms: int = number(
-        50, "ms", 0, 100, "for how long a joint may be too fast before the robot stops"
-    )
-    power_max: float = number(
-        900.0, "W", 10.0, 5000.0, "mechanical power of all motors that may be asked for"
-    )
+    speed_share: float = number(0.95, "1", 0.1, 1.5, "share of a joint's greatest speed")
+    speed_ms: int = number(50, "ms", 0, 100, "how long a joint may be faster")
+    power_max: float = number(900.0, "W", 10.0, 5000.0, "mechanical power of all motors")
     joint_margin: float = number(0.02, "rad", 0.0, 0.3, "distance kept from a joint's end stops")
     tilt_max: float = number(0.9, "rad", 0.1, 3.2, "tilt of the trunk at which the robot stops")
-    battery_min: int = number(
-        20, "%", 0, 100, "charge below which a robot does not stand up; at half it stops"
-    )
+    battery_min: int = number(20, "%", 0, 100, "charge to stand up; at half it stops")
     temperature_max: float = number(
         0.0,
         "°C",
@@ -687,16 +592,12 @@ class BridgeConfig:
     )
     report_max_ms: int = number(70, "ms", 5, 1000, "age of its last packet at which it stops")
     hold_ms: int = number(20, "ms", 2, 200, "age of a command from which on the joints are held")
-    damp_ms: int = number(
-        70, "ms", 4, 1000, "age at which the robot stops; Linux may stop a bridge for 54 ms"
-    )
+    damp_ms: int = number(70, "ms", 4, 1000, "age at which the robot stops; Linux stalls 54 ms")
     passive_s: float = number(
         3.0, "s", 0.1, 60.0, "how long a robot that stops is damped before its motors are off"
     )
-    stand_kp: float = number(
-        80.0, "N·m/rad", 1.0, 300.0, "stiffness of the joints while the bridge moves the robot"
-    )
-    stand_kd: float = number(4.0, "N·m·s/rad", 0.1, 20.0, "damping of the joints likewise")
+    stand_kp: float = number(80.0, "N·m/rad", 1.0, 300.0, "stiffness while the bridge moves it")
+    stand_kd: float = number(4.0, "N·m·s/rad", 0.1, 20.0, "damping likewise")
     stand_s: float = number(3.0, "s", 1.0, 30.0, "how long standing up takes, and lying down")
 
 

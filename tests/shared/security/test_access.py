@@ -142,9 +142,13 @@ LARGEST: tuple[Message, ...] = (
     Truth(
         *HEAD,
         robot_names(10),
-        *(np.ones((10, k)) for k in (3, 4, 3, 3)),
+        np.ones((10, 3)),
+        np.ones((10, 4)),
+        np.ones((10, 3)),
+        np.ones((10, 3)),
         np.ones((10, 4, 3)),
-        *np.ones((2, 45)),
+        np.ones(45),
+        np.ones(45),
     ),
     Event.of(1 << 41, "fall", "r10", LONG),
     Status(
