@@ -13,18 +13,13 @@ from functools import cache
 from hashlib import sha256
 from typing import Any
 
-from quadriga.shared.about import QUESTIONS
 from quadriga.shared.messages import Message
 from quadriga.shared.topic import CONFIGURED, Topic
 from quadriga.shared.topics import TABLE
 
 _PLAIN = {
-    bool: "boolean",
-    int: "integer",
-    float: "number",
-    str: "string",
-    list: "array",
-    dict: "object",
+    **{bool: "boolean", int: "integer", float: "number"},
+    **{str: "string", list: "array", dict: "object"},
 }
 _HEAD = """\
 # Topics and messages
@@ -38,16 +33,6 @@ This page is generated: `python -m quadriga.shared.schema > docs/messages.md`.
 
 | topic | per robot | message | from | to | period | maximum age | recorded |
 |---|---|---|---|---|---|---|---|
-"""
-_QUESTIONS = """\
-
-## Questions
-
-What each process answers when it is asked (a query of Zenoh) on `<team>/<process>/<question>`,
-before the walk and during it. Nothing of it is recorded.
-
-| question | answer | asked by |
-|---|---|---|
 """
 
 
@@ -94,29 +79,20 @@ def json_schema(kind: type[Message]) -> dict[str, Any]:
 
 
 def to_markdown() -> str:
-    """The page: the table of topics, then a table for each message; the same of questions."""
+    """The page: the table of topics, then a table for each message."""
     rows = "".join(f"| {' | '.join(_row(topic))} |\n" for topic in TABLE)
-    messages = "".join(map(_section, dict.fromkeys(topic.type for topic in TABLE)))
-    questions = "".join(
-        f"| `{item.name}` | {_link(item.type)} | {', '.join(item.askers)} |\n" for item in QUESTIONS
-    )
-    answers = "".join(_section(item.type) for item in QUESTIONS)
-    return _HEAD + rows + messages + _QUESTIONS + questions + answers
+    return _HEAD + rows + "".join(map(_section, dict.fromkeys(topic.type for topic in TABLE)))
 
 
 def _row(topic: Topic) -> Iterator[str]:
     yield f"`{topic.name}`"
     yield "yes" if topic.per_robot else ""
-    yield _link(topic.type)
+    yield f"[{topic.type.__name__}](#{topic.type.__name__.lower()})"
     yield ", ".join(topic.senders)
     yield ", ".join(topic.receivers)
     for ms, nothing in ((topic.period_ms, "on event"), (topic.max_age_ms, "")):
         yield "configured" if ms == CONFIGURED else f"{ms} ms" if ms else nothing
     yield "yes" if topic.recorded else "no"
-
-
-def _link(kind: type[Message]) -> str:
-    return f"[{kind.__name__}](#{kind.__name__.lower()})"
 
 
 def _section(kind: type[Message]) -> str:

@@ -62,23 +62,19 @@ def _check_world(world: WorldConfig, names: tuple[str, ...]) -> None:
 
 def _check_models(config: Config) -> None:
     """Friction needs inertia; counts of feet are not taken for N."""
-    motors, feet = config.motors, config.sensors.foot_sensor
+    motors, team = config.motors, config.team
     friction = max(motors.friction, motors.viscous_friction)
     if friction > 0.0 and not motors.rotor_inertia:
-        raise ConfigError(
-            "motors.rotor_inertia",
-            f"false with joint friction of {friction:g}",
-            "true, or motors.friction = 0 and motors.viscous_friction = 0",
-            "friction of light joints turns their rates around at every tick",
-        )
-    counts = (config.team.plant == SIMULATED and feet != "newtons") or config.team.plant == BRIDGED
-    if config.controller.foot_load == "sensor" and counts:
-        raise ConfigError(
-            "controller.foot_load",
-            "'sensor' with feet that give counts",
-            "'fused', or simulated robots with sensors.foot_sensor = 'newtons'",
-            "counts of unknown scale and bias would be taken for N",
-        )
+        got, expected = f"false with joint friction of {friction:g}", "true, or no joint friction"
+        cause = "friction of light joints turns their rates around at every tick"
+        raise ConfigError("motors.rotor_inertia", got, expected, cause)
+    measures = team.plant == SIMULATED and config.sensors.foot_sensor == "newtons"
+    known = team.plant in (SIMULATED, BRIDGED)
+    if config.controller.foot_load == "sensor" and known and not measures:
+        got = "'sensor' with feet that give counts"
+        expected = "'fused', or simulated robots with sensors.foot_sensor = 'newtons'"
+        cause = "counts of unknown scale and bias would be taken for N"
+        raise ConfigError("controller.foot_load", got, expected, cause)
 
 
 def _check_planner(planner: PlannerConfig, world: WorldConfig) -> None:
@@ -86,63 +82,47 @@ def _check_planner(planner: PlannerConfig, world: WorldConfig) -> None:
     kind = find_kind(planner.kind)
     read_options(kind, planner.options)
     if planner.applied > planner.N:
-        raise ConfigError(
-            "planner.applied", str(planner.applied), f"at most planner.N = {planner.N}"
-        )
+        expected = f"at most planner.N = {planner.N}"
+        raise ConfigError("planner.applied", str(planner.applied), expected)
     if not kind.publishes:
         return
     if -1.0 < planner.damping < 0.0:
         raise ConfigError("planner.damping", f"{planner.damping:g}", "-1, or 0 … 0.95")
     if planner.cost == "team" and kind.needs_peers and planner.output_bounds != "none":
-        raise ConfigError(
-            "planner.output_bounds",
-            f"{planner.output_bounds!r} with planner.cost 'team'",
-            "'none', or planner.cost = 'own'",
-            "each agent would plan with bounds that its peers do not know",
-        )
+        got = f"{planner.output_bounds!r} with planner.cost 'team'"
+        cause = "each agent would plan with bounds that its peers do not know"
+        raise ConfigError("planner.output_bounds", got, "'none', or planner.cost = 'own'", cause)
     latency = max(1, planner.latency_ms) if kind.central else planner.latency_ms
     longest = SAMPLE_MS * (planner.N - planner.applied)
     if latency > longest:
-        raise ConfigError(
-            "planner.latency_ms",
-            str(planner.latency_ms),
-            f"at most {SAMPLE_MS}·(planner.N − planner.applied) = {longest} ms",
-            "a plan would have run out before the next one takes effect",
-        )
+        expected = f"at most {SAMPLE_MS}·(planner.N − planner.applied) = {longest} ms"
+        cause = "a plan would have run out before the next one takes effect"
+        raise ConfigError("planner.latency_ms", str(planner.latency_ms), expected, cause)
     least = planner.peer_timeout + _ANSWER
     if world.mode == "lockstep" and world.command_timeout < least:
-        raise ConfigError(
-            "world.command_timeout",
-            f"{world.command_timeout:g}",
-            f"at least planner.peer_timeout + {_ANSWER:g} s = {least:g} s",
-            "else robots that wait for a frozen peer's plan count as frozen too",
-        )
+        expected = f"at least planner.peer_timeout + {_ANSWER:g} s = {least:g} s"
+        cause = "else robots that wait for a frozen peer's plan count as frozen too"
+        raise ConfigError("world.command_timeout", f"{world.command_timeout:g}", expected, cause)
 
 
 def _check_plants(config: Config) -> None:
     """What plants of a robot each cannot do: be yoked in simulation, or know the whole truth."""
-    team = config.team
+    team, each = config.team, "team.plant_per_robot"
     if team.plant == BRIDGED and not team.plant_per_robot:
         cause = "every robot has a bridge of its own"
-        raise ConfigError("team.plant_per_robot", f"false with plant {BRIDGED!r}", "true", cause)
+        raise ConfigError(each, f"false with plant {BRIDGED!r}", "true", cause)
     if team.plant == BRIDGED and config.world.mode != "realtime":
         cause = "robots do not wait for a command"
         raise ConfigError("world.mode", f"lockstep with plant {BRIDGED!r}", "realtime", cause)
     if team.plant_per_robot and config.estimator.kind == "truth":
-        raise ConfigError(
-            "estimator.kind",
-            "'truth' with team.plant_per_robot = true",
-            "'kalman', or team.plant_per_robot = false",
-            "the plant of one robot does not know where all are",
-        )
+        cause = "the plant of one robot does not know where all are"
+        expected = f"'kalman', or {each} = false"
+        raise ConfigError("estimator.kind", f"'truth' with {each} = true", expected, cause)
     simulated = team.plant == SIMULATED and team.plant_per_robot
     if simulated and team.robots > 1 and team.yokes != "none":
-        raise ConfigError(
-            "team.plant_per_robot",
-            f"true with simulated robots and {team.yokes!r} yokes",
-            "team.yokes = 'none', or team.plant_per_robot = false",
-            "robots that are simulated in worlds of their own cannot pull at each other",
-        )
+        got, expected = f"true with simulated {team.yokes!r} yokes", "team.yokes = 'none', or false"
+        cause = "robots that are simulated in worlds of their own cannot pull at each other"
+        raise ConfigError(each, got, expected, cause)
 
 
 def _check_agent_command(config: Config) -> None:
@@ -151,12 +131,9 @@ def _check_agent_command(config: Config) -> None:
     if line:
         parse_line(line)
     if line and kind != NO_PLANNER:
-        raise ConfigError(
-            "planner.kind",
-            f"{kind!r} with team.agent_command {line!r}",
-            f"{NO_PLANNER!r}, or team.agent_command = ''",
-            "a program of one's own takes the place of agents and planners",
-        )
+        got = f"{kind!r} with team.agent_command {line!r}"
+        cause = "a program of one's own takes the place of agents and planners"
+        raise ConfigError("planner.kind", got, repr(NO_PLANNER), cause)
 
 
 def _check_identification(config: Config) -> None:
@@ -166,9 +143,6 @@ def _check_identification(config: Config) -> None:
         if first > last:
             raise ConfigError(f"identification.{key}", f"[{first}, {last}]", "[least, greatest]")
     if ident.response and ident.predictor != "periodic":
-        raise ConfigError(
-            "identification.response",
-            f"{ident.response!r} with the predictor {ident.predictor!r}",
-            "identification.predictor = 'periodic'",
-            "no other is made of responses to single forces",
-        )
+        got, expected = f"{ident.response!r} with {ident.predictor!r}", "predictor 'periodic'"
+        cause = "no other is made of responses to single forces"
+        raise ConfigError("identification.response", got, expected, cause)

@@ -11,11 +11,12 @@ from typing import Any, Final, NamedTuple
 
 from quadriga.shared.unitree.dds import (
     DdsParticipant,
-    SampleInfo,
+    StructReader,
+    StructTopic,
+    StructWriter,
     bytes_at,
     number_at,
     string_at,
-    take,
 )
 
 MOTION_SWITCHER: Final = "motion_switcher"
@@ -102,26 +103,25 @@ class RpcEnd:
 
     def __init__(self, participant: DdsParticipant, service: str, *, serves: bool) -> None:
         self._participant, self._serves, self.service = participant, serves, service
+        layouts = {"request": _RpcRequest, "response": _RpcResponse}
         topics = [
-            participant.topic(
+            StructTopic(
                 f"rt/api/{service}/{kind}",
                 f"unitree_api::msg::dds_::{kind.capitalize()}_",
                 c.sizeof(layout),
                 c.alignment(layout),
                 _operations(layout),
             )
-            for kind, layout in (("request", _RpcRequest), ("response", _RpcResponse))
+            for kind, layout in layouts.items()
         ]
-        self._writer = participant.writer(topics[serves])
-        self._reader = participant.reader(topics[not serves])
-        self._sample: Any = _RpcRequest() if serves else _RpcResponse()
-        self._info = SampleInfo()
+        self._writer = StructWriter(participant, topics[serves])
+        self._reader = StructReader(participant, topics[not serves])
 
     @property
     def is_linked(self) -> bool:
         """Whether somebody is at the other end: what is sent before is lost."""
-        seen = self._participant
-        return bool(seen.readers_seen_by(self._writer) and seen.writers_seen_by(self._reader))
+        seen, there = self._participant, self._writer.handle
+        return bool(seen.readers_seen_by(there) and seen.writers_seen_by(self._reader.handle))
 
     def send(self, message: RpcMessage) -> bool:
         """Send; whether the library took it."""
@@ -129,12 +129,13 @@ class RpcEnd:
         sample: Any = _RpcRequest(number, api, text=text.encode())
         if self._serves:
             sample = _RpcResponse(number, api, code, text.encode())
-        return bool(self._participant.library.dds_write(self._writer, c.addressof(sample)) >= 0)
+        return self._writer.send(bytes(sample))
 
     def receive(self) -> Iterator[RpcMessage]:
         """What has come since the last call."""
-        sample = self._sample
-        while take(self._participant.library, self._reader, sample, self._info):
+        layout: Any = _RpcRequest if self._serves else _RpcResponse
+        while (raw := self._reader.take()) is not None:
+            sample = layout.from_buffer_copy(raw)  # its text is the reader's, until the next
             code = OK if self._serves else int(sample.code)
             text = (sample.text or b"").decode(errors="replace")
             yield RpcMessage(int(sample.id), int(sample.api), text, code)
