@@ -35,19 +35,12 @@ def test_every_builder_of_a_built_in_kind_is_there(name: str) -> None:
 def test_a_plugin_is_a_kind_like_any_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     before = installed_kinds()
     install_kind(tmp_path, monkeypatch, "other", f"{LOCAL}, needs_peers=True")
+    install_module(tmp_path, monkeypatch, "asleep", "raise RuntimeError('imported')")
     config = load(None, {"planner.kind": "other"})
     assert config_sha256(config) != config_sha256(load(None, {}))
-    assert {*installed_kinds()} == {*before, "other"}
+    assert {*installed_kinds()} == {*before, "other", "asleep"}, "and none is imported"
     assert find_kind("other").agents_predict
     assert plugin_origin("other").startswith("quadriga-other 1.2 ")
-
-
-def test_it_is_not_imported_by_who_only_lists_the_kinds(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    install_module(tmp_path, monkeypatch, "asleep", "raise RuntimeError('imported')")
-    assert "asleep" in installed_kinds()
-    load(None, {"planner.kind": "distributed"})
 
 
 @pytest.mark.parametrize(
