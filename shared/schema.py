@@ -17,7 +17,7 @@ from quadriga.shared.messages import Message
 from quadriga.shared.topic import CONFIGURED, Topic
 from quadriga.shared.topics import TABLE
 
-_PLAIN = {
+_PLAIN: dict[type, str] = {
     **{bool: "boolean", int: "integer", float: "number"},
     **{str: "string", list: "array", dict: "object"},
 }

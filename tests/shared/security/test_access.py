@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -9,8 +10,6 @@ import pytest
 
 from quadriga.shared.codec import MAX_BYTES, encode
 from quadriga.shared.config.load import load
-from quadriga.shared.messages import Event, Message, Plan, Status, Truth
-from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.runtime.places import SOURCE
 from quadriga.shared.security.access import (
     Rights,
@@ -126,52 +125,28 @@ def test_everybody_who_may_be_on_the_bus_has_an_identity() -> None:
     assert (identity_of("echo-4711"), identity_of("plant_r1")) == ("observer", "plant_r1")
 
 
-LONG = "ä" * 4096
-N = 100
-HEAD = (1 << 41, 1 << 61)
-LARGEST: tuple[Message, ...] = (
-    Plan(
-        *HEAD,
-        1 << 61,
-        np.ones((N, 12)),
-        np.ones((N, 6)),
-        LONG,
-        {f"r{k}": 1 << 61 for k in range(10)},
-        1 << 61,
-    ),
-    Truth(
-        *HEAD,
-        robot_names(10),
-        np.ones((10, 3)),
-        np.ones((10, 4)),
-        np.ones((10, 3)),
-        np.ones((10, 3)),
-        np.ones((10, 4, 3)),
-        np.ones(45),
-        np.ones(45),
-    ),
-    Event.of(1 << 41, "fall", "r10", LONG),
-    Status(
-        *HEAD,
-        LONG,
-        LONG,
-        "kalman",
-        {f"age{k}": 1.0 for k in range(50)},
-        {f"counter{k}": 1 << 61 for k in range(50)},
-        np.ones(1000),
-        np.ones(10_000),
-    ),
-)
-
-
-@pytest.mark.parametrize("message", LARGEST, ids=lambda message: type(message).__name__)
-def test_the_largest_message_of_a_type_fits(message: Message) -> None:
-    assert len(encode(message)) <= largest(type(message))
+LENGTHS = {"N": 100, "n": 10, "k": 45, "P": 1000, "K": 10_000}
+LARGEST: dict[type, Any] = {
+    **{
+        int: 1 << 41,
+        float: 1.0,
+        bool: True,
+        str: "ä" * 4096,
+        list: ("measurement:r10:4711",) * 500,
+    },
+    dict: {f"counter of something {k}": 1 << 41 for k in range(300)},
+}
 
 
 @pytest.mark.parametrize("topic", TABLE, ids=lambda topic: topic.name)
-def test_no_type_takes_more_than_the_codec_would(topic: Topic) -> None:
-    assert 0 < largest(topic.type) <= (2048 if topic in (STATE, COMMAND) else MAX_BYTES)
+def test_the_largest_message_of_a_type_fits(topic: Topic) -> None:
+    kind, values = topic.type, dict[str, Any]()
+    for item in fields(kind):
+        shape = item.metadata.get("shape")
+        sizes = [LENGTHS.get(d, d) for d in shape or ()]
+        values[item.name] = np.ones(sizes) if shape else LARGEST[item.metadata["kind"]]
+    limit = 2048 if topic in (STATE, COMMAND) else MAX_BYTES
+    assert len(encode(kind(**values))) <= largest(kind) <= limit
 
 
 def test_every_topic_has_a_size() -> None:
