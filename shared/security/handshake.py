@@ -20,9 +20,8 @@ UNTRUSTED: Final = "untrusted"  # its certificate is of another authority, or fo
 REFUSED: Final = "refused"  # it does not accept ours
 
 _TIMEOUT: Final = 2.0  # s, for the connection and for each answer
-# s, in which a listener that does not accept our certificate says so: it does that afterwards.
+# s, in which a listener that does not accept our certificate says so, after the handshake.
 _VERDICT: Final = 0.3
-_LOOK: Final = 0.02  # s
 _DATES: Final = {9: NOT_YET_VALID, 10: EXPIRED}  # OpenSSL's codes
 CAUSES: Final = {
     UNREACHABLE: "is the router there (`quadriga router`), and does the name resolve?",
@@ -70,9 +69,17 @@ def shake_hands(endpoint: str, files: TlsFiles) -> Handshake:
         return Handshake(UNREACHABLE, system_reason(error))
 
 
+def _await_verdict(secured: ssl.SSLSocket) -> Handshake:
+    """What the listener says of our certificate once it has seen it; silence is consent."""
+    secured.settimeout(_VERDICT)
+    try:
+        return Handshake(TRUSTED) if secured.recv(1) else Handshake(REFUSED, "it hung up")
+    except TimeoutError:
+        return Handshake(TRUSTED)
+
+
 def _context(files: TlsFiles) -> ssl.SSLContext:
-    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
-    context.minimum_version = ssl.TLSVersion.TLSv1_2
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)  # TLS 1.2 at least
     try:
         context.load_verify_locations(files.authority)
         context.load_cert_chain(files.certificate, files.key)
@@ -80,18 +87,3 @@ def _context(files: TlsFiles) -> ssl.SSLContext:
         folder, expected = str(files.certificate.parent), "a certificate, its key, the authority's"
         raise ConfigError(folder, system_reason(error), expected, "`quadriga certs show`") from None
     return context
-
-
-def _await_verdict(secured: ssl.SSLSocket) -> Handshake:
-    """What the listener says of our certificate once it has seen it; silence is consent."""
-    secured.settimeout(_LOOK)
-    for _ in range(round(_VERDICT / _LOOK)):
-        try:
-            if not secured.recv(1):
-                return Handshake(REFUSED, "it hung up")
-        except TimeoutError:
-            session = secured.session
-            if session is None or not session.has_ticket:
-                continue
-        break
-    return Handshake(TRUSTED)
