@@ -30,9 +30,6 @@ class TerrainKind:
 
 
 _H: Final = "up to {terrain_height:g} m"
-_STAIRS: Final = (
-    "stairs, {stairs_count} steps of {stairs_rise:g} m up and down, {stairs_run:g} m deep"
-)
 _ROWS: Final = (
     TerrainKind("flat", "", "flat"),
     TerrainKind("boxes", "ground:build_blocks", f"boxes {_H}"),
