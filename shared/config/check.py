@@ -120,7 +120,8 @@ def _check_plants(config: Config) -> None:
         raise ConfigError("estimator.kind", f"'truth' with {each} = true", expected, cause)
     simulated = team.plant == SIMULATED and team.plant_per_robot
     if simulated and team.robots > 1 and team.yokes != "none":
-        got, expected = f"true with simulated {team.yokes!r} yokes", "team.yokes = 'none', or false"
+        got = f"true with simulated robots and {team.yokes!r} yokes"
+        expected = f"team.yokes = 'none', or {each} = false"
         cause = "robots that are simulated in worlds of their own cannot pull at each other"
         raise ConfigError(each, got, expected, cause)
 

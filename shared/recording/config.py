@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import asdict, replace
 from functools import lru_cache
+from typing import Final
 
 from quadriga.shared.config.load import build, flatten
 from quadriga.shared.config.sections import Config
@@ -13,6 +14,8 @@ from quadriga.shared.printable import printable_line
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.recording.recover import DamagedRecording
 from quadriga.shared.robots.registry import ROBOTS
+
+_OTHER_VERSION: Final = "recorded by another version of quadriga: use that one"
 
 
 def recorded_config(recording: Recording | DamagedRecording) -> Config:
@@ -38,7 +41,7 @@ def recorded_config(recording: Recording | DamagedRecording) -> Config:
             f"configuration of {recording.path}",
             f"{error.name} = {error.got}",
             error.expected,
-            error.cause or "recorded by another version of quadriga: use that one",
+            error.cause if error.name == "planner.kind" else _OTHER_VERSION,
         ) from None
     except RecursionError:  # in the words about a value that nests as deeply as JSON permits
         raise RecordingError(
