@@ -124,11 +124,7 @@ class BusConfig:
         "back, before they leave; meanwhile simulated robots are led down",
     )
     clock_timeout: float = number(
-        0.5,
-        "s",
-        0.3,
-        10.0,
-        "realtime, plants of their own: age of a plant's newest message at which the walk ends",
+        0.5, "s", 0.3, 10.0, "realtime: age of a plant's newest message at which the walk ends"
     )
 
 
@@ -186,12 +182,7 @@ class WorldConfig:
     )
     live_faults: bool = flag(False, "quadriga fault --live may make sensors and motors faulty")
     command_timeout: float = number(
-        10.0,
-        "s wall",
-        0.05,
-        60.0,
-        "lockstep: a robot silent longer is put into damping; with a planner at least 1 s more "
-        "than planner.peer_timeout",
+        10.0, "s wall", 0.05, 60.0, "lockstep: a robot that is silent longer is damped"
     )
     command_hold_ms: int = number(20, "ms", 1, 1000, "realtime: an older command is held")
     command_damp_ms: int = number(200, "ms", 1, 10000, "realtime: an older command is lost")
@@ -432,11 +423,7 @@ class PlannerConfig:
         "largest planned deviation of z, vx, vy, roll, pitch, wz from what is commanded",
     )
     trust_range: Numbers = number(
-        (0.06, 0.5, 0.25, 2.0),
-        "m, m/s, rad, rad/s",
-        1e-6,
-        inf,
-        "the plan fades out as the state leaves this range of the data",
+        (0.06, 0.5, 0.25, 2.0), "m, m/s, rad, rad/s", 1e-6, inf, "beyond it the plan fades out"
     )
     solver: str = choice(
         ("daqp", "osqp"), "daqp: the closed form, Newton's method at limits of forces, else DAQP"
@@ -494,12 +481,7 @@ class IdentificationConfig:
     order_per_robot: int = number(12, "states", 1, 100, "system order n = this · robots")
     max_radius: float = number(1.0, "1", 0.01, 10.0, "gate: radius of the best-response map")
     max_peers_harm: float = number(
-        0.02,
-        "1",
-        0.0,
-        1000.0,
-        "gate: share by which the predicted effect of peers may raise the squared error of an "
-        "output on held-out data; beyond its 95 % interval it is refused",
+        0.02, "1", 0.0, 1000.0, "gate: share by which peers may raise an output's squared error"
     )
     gain_range: Numbers = number(
         (0.3, 2.0), "1", -10.0, inf, "gate: height gain, predicted / physical"
@@ -580,12 +562,7 @@ class BridgeConfig:
     tilt_max: float = number(0.9, "rad", 0.1, 3.2, "tilt of the trunk at which the robot stops")
     battery_min: int = number(20, "%", 0, 100, "charge to stand up; at half it stops")
     temperature_max: float = number(
-        0.0,
-        "°C",
-        0.0,
-        120.0,
-        "temperature of a motor above which a robot does not stand up, and warns; 8 °C more stop "
-        "it; 0: what this kind of robot has, by joint",
+        0.0, "°C", 0.0, 120.0, "greatest of a motor to stand up; 8 °C more stop it; 0: the robot's"
     )
     report_share: float = number(
         0.8, "1", 0.01, 1.0, "share of a second's packets that must come before it is commanded"

@@ -47,8 +47,8 @@ _ROWS: Final = (
         "stairs",
         "ground:build_stairs",
         "stairs, {stairs_count} steps of {stairs_rise:g} m up and down, {stairs_run:g} m deep",
-        "up, a landing, and down again",
-        "stairs_rise",
+        meaning="up, a landing, and down again",
+        height_key="stairs_rise",
     ),
 )
 TERRAINS: Final[Mapping[str, TerrainKind]] = MappingProxyType({row.name: row for row in _ROWS})
