@@ -95,8 +95,7 @@ docs: pages
 
 pages: $(STAMP)
 	$(BIN)/quadriga config --markdown > docs/configuration.md
-	$(BIN)/python -m quadriga.shared.messages_page > docs/messages.md
-	$(BIN)/python -m quadriga.shared.security.markdown
+	$(BIN)/python -m quadriga.shared.schema > docs/messages.md
 	$(BIN)/python -m quadriga.desk.page > docs/desk.md
 	$(BIN)/python -m quadriga.faults.page > docs/faults.md
 	$(BIN)/python -m quadriga.stop_times.page

@@ -19,10 +19,16 @@ from quadriga.agents.controller.maths.leg_reaction import foot_forces
 from quadriga.agents.controller.maths.rows import places, row_size
 from quadriga.shared.codes import with_detail
 from quadriga.shared.config.sections import Config
-from quadriga.shared.config.yokes import neighbours
 from quadriga.shared.messages import Command, State
 from quadriga.shared.modes import ENCODER_LOST, IMU_LOST
-from quadriga.shared.robots.conventions import GRAVITY, JOINT_NAMES, N_JOINTS, N_LEGS, Array
+from quadriga.shared.robots.conventions import (
+    GRAVITY,
+    JOINT_NAMES,
+    N_JOINTS,
+    N_LEGS,
+    Array,
+    neighbours,
+)
 from quadriga.shared.robots.spec import RobotSpec
 from quadriga.shared.runtime.jit import compiled
 

@@ -10,7 +10,7 @@ import pinocchio
 
 from quadriga.bridges.limits import temperature_limits
 from quadriga.bridges.supervisor import tilt_of
-from quadriga.shared.config.bridge import BridgeConfig
+from quadriga.shared.config.sections import BridgeConfig
 from quadriga.shared.errors import CheckError
 from quadriga.shared.robots.conventions import FOOT_FRAMES, GRAVITY, JOINT_NAMES, Array
 from quadriga.shared.robots.pinocchio_model import build_pinocchio_model

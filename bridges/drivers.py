@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from quadriga.bridges.postures import passive
-from quadriga.shared.config.bridge import BridgeConfig
+from quadriga.shared.config.sections import BridgeConfig
 from quadriga.shared.errors import BridgeError, ConfigError
 from quadriga.shared.robots.conventions import N_JOINTS
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns, sleep

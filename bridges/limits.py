@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadriga.plant.commands import MOST_KD, MOST_KP
-from quadriga.shared.config.bridge import BridgeConfig
+from quadriga.shared.config.sections import BridgeConfig
 from quadriga.shared.robots.conventions import N_JOINTS, Array
 from quadriga.shared.robots.spec import RobotSpec
 from quadriga.shared.runtime.jit import compiled

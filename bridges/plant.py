@@ -24,8 +24,7 @@ from quadriga.bridges.supervisor import (
 from quadriga.bridges.watchdog import BEAT_MS, Watchdog
 from quadriga.plant.protocol import Plant
 from quadriga.shared import codes
-from quadriga.shared.config.bridge import BridgeConfig
-from quadriga.shared.config.sections import Config
+from quadriga.shared.config.sections import BridgeConfig, Config
 from quadriga.shared.errors import CheckError, ConfigError
 from quadriga.shared.messages import Command, Event, State, Status
 from quadriga.shared.printable import printable_line

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from quadriga.shared.config.bridge import BridgeConfig
+from quadriga.shared.config.sections import BridgeConfig
 from quadriga.shared.robots.conventions import JOINT_NAMES, N_JOINTS, Array
 from quadriga.shared.robots.motions import Motion
 from quadriga.shared.robots.spec import RobotSpec

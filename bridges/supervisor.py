@@ -36,7 +36,7 @@ from quadriga.bridges.postures import (
 )
 from quadriga.shared import modes
 from quadriga.shared.codes import with_detail
-from quadriga.shared.config.bridge import BridgeConfig
+from quadriga.shared.config.sections import BridgeConfig
 from quadriga.shared.messages import Command
 from quadriga.shared.robots.conventions import JOINT_NAMES, N_JOINTS, Array
 from quadriga.shared.robots.motions import Motion, posture_at, way_down, way_up
@@ -46,8 +46,8 @@ from quadriga.shared.unitree.packets import (
     PROTECTED,
     MotorTargets,
     RobotReport,
-    are_pressed,
     parse_buttons,
+    pressed_buttons,
 )
 
 TRACKING_ERROR: Final = "tracking-error"  # why a test of joints is stopped
@@ -264,7 +264,7 @@ class Supervisor:
         config, report, mode = self._config, inputs.report, state.mode
         if inputs.estop:
             return with_detail("estop", inputs.estop)
-        if are_pressed(report.remote, self._stop_buttons):
+        if self._stop_buttons <= pressed_buttons(report.remote):
             return with_detail("remote", config.stop_buttons)
         # Once the watchdog has damped the motors, it is who else has commanded them.
         if inputs.stall > config.damp_ms and mode is not BridgeMode.PASSIVE:

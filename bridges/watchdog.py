@@ -20,7 +20,7 @@ import numpy as np
 
 from quadriga.bridges.drivers import RobotDriver, open_driver
 from quadriga.bridges.postures import damped, passive
-from quadriga.shared.config.bridge import BridgeConfig
+from quadriga.shared.config.sections import BridgeConfig
 from quadriga.shared.errors import BridgeError
 from quadriga.shared.robots.conventions import N_JOINTS
 from quadriga.shared.runtime.clock import Rate

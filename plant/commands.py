@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from quadriga.shared.codec import decode, encode
-from quadriga.shared.config.world import WorldConfig
+from quadriga.shared.config.sections import WorldConfig
 from quadriga.shared.errors import MessageError
 from quadriga.shared.messages import Command, State
 from quadriga.shared.robots.conventions import N_JOINTS, Array

@@ -72,12 +72,7 @@ QUESTIONS: Final = (ABOUT,)
 
 
 def stage_of(reached: frozenset[str], *, met: bool) -> str:
-    """How far a process has come.
-
-    Args:
-        reached: the stages that it has announced: `HERE`, `READY`.
-        met: whether it has seen that all are here.
-    """
+    """How far a process has come that announced the stages `reached`; `met`: has seen all here."""
     if READY in reached:
         return READY
     if HERE not in reached:
@@ -86,13 +81,7 @@ def stage_of(reached: frozenset[str], *, met: bool) -> str:
 
 
 def scheduling_of(*, wanted: bool, granted: bool, stage: str) -> str:
-    """How the system schedules a process, which asks for real time before it is ready.
-
-    Args:
-        wanted: whether it asks for it.
-        granted: whether it has it now.
-        stage: how far it has come.
-    """
+    """How the system schedules a process, which asks for real time before it is ready."""
     if granted:
         return REALTIME
     return REFUSED if wanted and stage == READY else ORDINARY

@@ -7,8 +7,6 @@ second form, `code_of` reads the code of either.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from types import MappingProxyType
 from typing import Final, NamedTuple
 
 
@@ -19,91 +17,60 @@ class EventCode(NamedTuple):
     meaning: str
 
 
-START: Final = "start"
-TERRAIN: Final = "terrain"
-PAYLOAD: Final = "payload"
-PUSH: Final = "push"
-FALL: Final = "fall"
-UNSTABLE: Final = "unstable"
-WEAK_MOTOR: Final = "weak-motor"
-FAULT_BEGINS: Final = "fault-begins"
-FAULT_ENDS: Final = "fault-ends"
-FAULT_ASKED: Final = "fault-asked"
-FAULT_REFUSED: Final = "fault-refused"
-MALFORMED: Final = "malformed"
-TIME_OVER: Final = "time-over"
-FALLEN: Final = "fallen"
-SIGNAL: Final = "signal"
-STOPPED: Final = "stopped"
-COMMAND_LOST: Final = "command-lost"
-PLANT_GONE: Final = "plant-gone"
-PLANT_FAILED: Final = "plant-failed"
-LINK_LOST: Final = "link-lost"
-LEAD_GONE: Final = "lead-gone"
-ESTOPPED: Final = "estop"
-LIES: Final = "lies"
-STOP_ASKED: Final = "stop-asked"
-RESET: Final = "reset"
-INPUT_LOST: Final = "input-lost"
-HALTS: Final = "halts"
-RESUMED: Final = "resumed"
-STANDS_UP: Final = "stands-up"
-STANDS_AGAIN: Final = "stands-again"
-BRIDGE_MODE: Final = "bridge-mode"
-ROBOT_STOPPED: Final = "robot-stopped"
+EVENTS: Final[dict[str, EventCode]] = {}
 
-EVENTS: Final[Mapping[str, EventCode]] = MappingProxyType(
-    {
-        START: EventCode("start", "the walk begins"),
-        TERRAIN: EventCode("terrain", "what the ground is"),
-        PAYLOAD: EventCode("payload", "a robot carries a load"),
-        PUSH: EventCode("push", "a push of a robot begins"),
-        FALL: EventCode("fall", "a robot fell"),
-        UNSTABLE: EventCode("fault", "the simulation is unstable: the walk ends at once"),
-        WEAK_MOTOR: EventCode("fault", "a motor gives less torque from now on"),
-        FAULT_BEGINS: EventCode("fault", "a fault that is made on purpose begins"),
-        FAULT_ENDS: EventCode("fault", "a fault that was made on purpose is over"),
-        FAULT_ASKED: EventCode("fault", "somebody has asked for a fault: as in world.faults"),
-        FAULT_REFUSED: EventCode("fault", "somebody has asked for one that there cannot be"),
-        MALFORMED: EventCode("fault", "commands that are none, or that nobody can mean"),
-        ESTOPPED: EventCode("fault", "the emergency stop: simulated joints are damped from now on"),
-        LIES: EventCode("fault", "a robot that is stopped has sunk to the ground: no fall"),
-        STOP_ASKED: EventCode("fault", "somebody has asked the team to slow down and stand"),
-        RESET: EventCode("fault", "the operator has released the emergency stop"),
-        INPUT_LOST: EventCode("fault", "an agent slows down and stands: it lacks an input"),
-        HALTS: EventCode("fault", "an agent slows down and stands, as somebody has asked"),
-        RESUMED: EventCode(
-            "fault", "an agent walks again: its inputs have been whole for `team.resume_after`"
-        ),
-        STANDS_UP: EventCode("fault", "an agent's robot, which was damped, stands up"),
-        STANDS_AGAIN: EventCode("fault", "an agent's robot stands that had been damped"),
-        BRIDGE_MODE: EventCode(
-            "bridge", "a bridge's robot begins to stand up, walk or lie down, or is hot"
-        ),
-        ROBOT_STOPPED: EventCode("fault", "a bridge has stopped its robot: damped, then passive"),
-        TIME_OVER: EventCode("stop", "the walk is over: world.duration have passed"),
-        FALLEN: EventCode("stop", "the walk is over: a robot fell"),
-        SIGNAL: EventCode("stop", "the walk is over: the world was told to stop"),
-        STOPPED: EventCode("stop", "the walk is over: somebody has asked the team to stop"),
-        COMMAND_LOST: EventCode(
-            "stop", "the walk is over: commands of a robot do not come any more"
-        ),
-        PLANT_GONE: EventCode("stop", "the walk is over: one of several plants left or is silent"),
-        PLANT_FAILED: EventCode("stop", "the walk is over: the plant failed"),
-        LINK_LOST: EventCode("stop", "the walk is over: the link to the router is gone"),
-        LEAD_GONE: EventCode("stop", "who drives time vanished: as the recorder notes it"),
-    }
+
+def _event(code: str, kind: str, meaning: str) -> str:
+    EVENTS[code] = EventCode(kind, meaning)
+    return code
+
+
+START: Final = _event("start", "start", "the walk begins")
+TERRAIN: Final = _event("terrain", "terrain", "what the ground is")
+PAYLOAD: Final = _event("payload", "payload", "a robot carries a load")
+PUSH: Final = _event("push", "push", "a push of a robot begins")
+FALL: Final = _event("fall", "fall", "a robot fell")
+UNSTABLE: Final = _event("unstable", "fault", "the simulation is unstable: the walk ends at once")
+WEAK_MOTOR: Final = _event("weak-motor", "fault", "a motor gives less torque from now on")
+FAULT_BEGINS: Final = _event("fault-begins", "fault", "a fault that is made on purpose begins")
+FAULT_ENDS: Final = _event("fault-ends", "fault", "a fault that was made on purpose is over")
+FAULT_ASKED: Final = _event("fault-asked", "fault", "somebody asked for a fault as in world.faults")
+FAULT_REFUSED: Final = _event(
+    "fault-refused", "fault", "somebody asked for one that there cannot be"
 )
+MALFORMED: Final = _event("malformed", "fault", "commands that are none, or that nobody can mean")
+ESTOPPED: Final = _event(
+    "estop", "fault", "emergency stop: simulated joints are damped from now on"
+)
+LIES: Final = _event("lies", "fault", "a robot that is stopped has sunk to the ground: no fall")
+STOP_ASKED: Final = _event("stop-asked", "fault", "somebody asked the team to slow down and stand")
+RESET: Final = _event("reset", "fault", "the operator has released the emergency stop")
+INPUT_LOST: Final = _event("input-lost", "fault", "an agent slows down and stands: an input lacks")
+HALTS: Final = _event("halts", "fault", "an agent slows down and stands, as somebody has asked")
+RESUMED: Final = _event("resumed", "fault", "an agent walks again: its inputs are valid again")
+STANDS_UP: Final = _event("stands-up", "fault", "an agent's robot, which was damped, stands up")
+STANDS_AGAIN: Final = _event("stands-again", "fault", "a robot stands that had been damped")
+BRIDGE_MODE: Final = _event(
+    "bridge-mode", "bridge", "a robot stands up, walks, lies down, or is hot"
+)
+ROBOT_STOPPED: Final = _event(
+    "robot-stopped", "fault", "a bridge stopped its robot: damped, then passive"
+)
+TIME_OVER: Final = _event("time-over", "stop", "the walk is over: world.duration have passed")
+FALLEN: Final = _event("fallen", "stop", "the walk is over: a robot fell")
+SIGNAL: Final = _event("signal", "stop", "the walk is over: the world was told to stop")
+STOPPED: Final = _event("stopped", "stop", "the walk is over: somebody has asked the team to stop")
+COMMAND_LOST: Final = _event("command-lost", "stop", "the walk is over: a robot has no commands")
+PLANT_GONE: Final = _event("plant-gone", "stop", "the walk is over: a plant left or is silent")
+PLANT_FAILED: Final = _event("plant-failed", "stop", "the walk is over: the plant failed")
+LINK_LOST: Final = _event("link-lost", "stop", "the walk is over: the link to the router is gone")
+LEAD_GONE: Final = _event("lead-gone", "stop", "who drives time vanished: as the recorder notes it")
+
 DOWN: Final = frozenset((FALL, ROBOT_STOPPED))  # a robot that walks no more: the walk ends
 
 
 def with_detail(code: str, detail: str) -> str:
-    """A status or a reason to stop that has a detail: `code:detail`.
-
-    Args:
-        code: without a colon.
-        detail: any text.
-    """
+    """A status or a reason to stop that has a detail: `code:detail`, the code without a colon."""
     return f"{code}:{detail}"
 
 

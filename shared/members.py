@@ -28,10 +28,6 @@ OBSERVER: Final = "observer"  # whoever looks on: `echo`, `hz`
 # Who drives time, by name: the only plant, or that of the first robot. The others leave with it.
 LEADS: Final = frozenset((SIM, "plant_r1"))
 
-ALWAYS: Final = "always"
-CENTRAL: Final = "central"  # one process plans for all
-RECORDED: Final = "recorded"  # the team is recorded
-
 
 @dataclass(frozen=True, slots=True)
 class Role:
@@ -41,7 +37,6 @@ class Role:
         name: of the role, and of its only process; an agent's process has its robot's name, and
             the plant of a single robot that of `plant_name`.
         command: the subcommand of `quadriga` that is this process.
-        needed: when a team has such a process: `ALWAYS`, `CENTRAL` or `RECORDED`.
         per_robot: whether there is one for each robot.
         predicts: whether it reads a predictor.
         grace: how long it may take to leave once the walk is over or it is told to, s.
@@ -49,7 +44,6 @@ class Role:
 
     name: str
     command: str
-    needed: str = ALWAYS
     per_robot: bool = False
     predicts: bool = False
     grace: float = 12.0  # closing a session may take Zenoh ten seconds
@@ -60,9 +54,9 @@ class Role:
 ROLES: Final = (
     Role(SIM, "sim"),
     Role(AGENT, "agent", per_robot=True, predicts=True),
-    Role(PLANNER, "plan", needed=CENTRAL, predicts=True),
+    Role(PLANNER, "plan", predicts=True),
     Role(OPERATOR, "operate"),
-    Role(RECORDER, "record", needed=RECORDED, grace=20.0),
+    Role(RECORDER, "record", grace=20.0),
 )
 LAST: Final = ROLES[-1].name
 
@@ -108,10 +102,10 @@ def team_members(
         plant_each: whether each robot has a plant of its own.
         foreign: whether the agents are controllers of one's own.
     """
-    needed = {ALWAYS: True, CENTRAL: central, RECORDED: recorded}
+    left_out = {PLANNER: not central, RECORDER: not recorded}
     members = list[Member]()
     for role in ROLES:
-        if not needed[role.needed]:
+        if left_out.get(role.name):
             continue
         if role.per_robot:
             members += [Member(robot, role, robot, foreign) for robot in robots]

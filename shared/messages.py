@@ -29,11 +29,10 @@ JOINTS: Final = tuple(name.removesuffix("_joint") for name in JOINT_NAMES)
 FORCES: Final = tuple(f"{leg}.{axis}" for leg in LEGS for axis in XYZ)
 ONE: Final = ("",)  # a single number, called as its field is
 
-Dim = int | str
 F = TypeVar("F", bound="Flat")
 
 
-def array(*shape: Dim, entries: tuple[str, ...], unit: str, frame: str = "-") -> Any:
+def array(*shape: int | str, entries: tuple[str, ...], unit: str, frame: str = "-") -> Any:
     """Declare an array field of the wire: its shape, unit and frame.
 
     `entries` are the names of its numbers: of one robot, yoke or sample if it is of several; () of
@@ -59,10 +58,8 @@ class Message:
 class Flat(Message):
     """A message whose arrays all have fixed sizes: they are read-only views of one `row`.
 
-    Made of arrays like any other, or with `from_row`, in the order of its fields.
-
-    Attributes:
-        row: all numbers, float64; not to be changed.
+    Made of arrays like any other, or with `from_row`, in the order of its fields. The row is
+    float64 and not to be changed.
     """
 
     __slots__ = ("row",)
@@ -70,16 +67,15 @@ class Flat(Message):
     row: Array
 
     def __init__(self, tick: int, stamp_ns: int, *arrays: Array, **named: Array) -> None:
-        rest = list(self.CUTS)[len(arrays) :]
-        if named.keys() != {*rest}:
-            raise TypeError(f"{type(self).__name__}: got {sorted(named)}, expected {rest}")
         super().__init__(tick, stamp_ns)
-        parts = dict(zip(self.CUTS, (*arrays, *(named[name] for name in rest)), strict=True))
+        parts = dict(zip(self.CUTS, arrays, strict=False)) | named
+        if len(arrays) + len(named) != len(self.CUTS) or parts.keys() != self.CUTS.keys():
+            raise TypeError(f"{type(self).__name__}: got {sorted(parts)}, expected {[*self.CUTS]}")
         for name, cut in self.CUTS.items():
             if np.shape(parts[name]) != (cut.stop - cut.start,):
                 got = f"{type(self).__name__}.{name}: got shape {np.shape(parts[name])}"
                 raise ValueError(f"{got}, expected {(cut.stop - cut.start,)}")
-        self.row = np.concatenate([*parts.values()], dtype=float)
+        self.row = np.concatenate([parts[name] for name in self.CUTS], dtype=float)
 
     @classmethod
     def from_row(cls, tick: int, stamp_ns: int, row: Array) -> Self:

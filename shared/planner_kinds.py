@@ -8,10 +8,9 @@ that whoever only reads a configuration imports no planner.
 from __future__ import annotations
 
 import hashlib
-import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
@@ -22,6 +21,11 @@ from typing import Any, Final
 from quadriga.shared.errors import ConfigError, did_you_mean
 
 GROUP: Final = "quadriga.planners"
+NO_PLANNER: Final = "none"  # the kind without plans
+# What agents do of every kind that is one process for the team: they follow its plans.
+FOLLOW: Final = "quadriga.agents.planning.remote:build_remote"
+_LOCAL: Final = "quadriga.agents.planning.local:LocalPlanning"
+_CENTRAL: Final = "quadriga.agents.planner.team_planner"
 _KEY: Final = "planner.kind"
 
 
@@ -74,48 +78,36 @@ class PlannerKind:
         return self.needs_predictor and not self.central
 
 
-# What agents do of every kind that is one process for the team: they follow its plans.
-FOLLOW: Final = "quadriga.agents.planning.remote:build_remote"
-_LOCAL: Final = "quadriga.agents.planning.local:LocalPlanning"
-_CENTRAL: Final = "quadriga.agents.planner.team_planner"
-
-NO_PLANNER: Final = "none"  # the kind without plans
-
-BUILT_IN: Final[Mapping[str, PlannerKind]] = {
-    kind.name: kind
-    for kind in (
-        PlannerKind(
-            "distributed",
-            "each agent plans with its peers' last plans (eq. 12)",
-            _LOCAL,
-            needs_peers=True,
-        ),
-        PlannerKind("decentralised", "without its peers", _LOCAL),
-        PlannerKind(
-            "centralised",
-            "one process plans for all (eq. 7)",
-            FOLLOW,
-            f"{_CENTRAL}:build_centralised_team",
-        ),
-        PlannerKind(
-            "deepc",
-            "one process plans for all (eq. 5)",
-            FOLLOW,
-            f"{_CENTRAL}:build_deepc_team",
-            needs_data=True,
-        ),
-        PlannerKind(
-            NO_PLANNER,
-            "nominal forces",
-            "quadriga.agents.planning.nominal:build_nominal",
-            needs_predictor=False,
-            publishes=False,
-        ),
-    )
-}
-
-
-_RECORDED: Final[dict[str, tuple[PlannerKind, str]]] = {}  # absent kinds, and where they are from
+_KINDS: Final = (
+    PlannerKind(
+        "distributed",
+        "each agent plans with its peers' last plans (eq. 12)",
+        _LOCAL,
+        needs_peers=True,
+    ),
+    PlannerKind("decentralised", "without its peers", _LOCAL),
+    PlannerKind(
+        "centralised",
+        "one process plans for all (eq. 7)",
+        FOLLOW,
+        f"{_CENTRAL}:build_centralised_team",
+    ),
+    PlannerKind(
+        "deepc",
+        "one process plans for all (eq. 5)",
+        FOLLOW,
+        f"{_CENTRAL}:build_deepc_team",
+        needs_data=True,
+    ),
+    PlannerKind(
+        NO_PLANNER,
+        "nominal forces",
+        "quadriga.agents.planning.nominal:build_nominal",
+        needs_predictor=False,
+        publishes=False,
+    ),
+)
+BUILT_IN: Final[Mapping[str, PlannerKind]] = {kind.name: kind for kind in _KINDS}
 
 
 def find_kind(name: str) -> PlannerKind:
@@ -124,40 +116,7 @@ def find_kind(name: str) -> PlannerKind:
     Raises:
         ConfigError: no installed package has such a kind, or two have; or it cannot be imported.
     """
-    return BUILT_IN.get(name) or (_RECORDED[name][0] if absent_origin(name) else _find_plugin(name))
-
-
-def describe_plugin(name: str) -> str:
-    """What `stand_in` needs to know of a plug-in's kind, as JSON; "" of a built-in one."""
-    origin = plugin_origin(name)
-    return json.dumps({**asdict(find_kind(name)), "origin": origin}) if origin else ""
-
-
-def stand_in(name: str, described: str, options: str) -> None:
-    """Let recordings of a kind be read whose package is not installed: nothing can plan with it.
-
-    Args:
-        name: of the kind.
-        described: see `describe_plugin`; "" if that is not known.
-        options: of the recorded walk.
-    """
-    if name in installed_kinds():
-        return
-    try:
-        facts = dict(json.loads(described or "{}"))
-        origin = str(facts.pop("origin", "")) or f"the package that has {name!r}"
-        kind = PlannerKind(**{"title": "", "build": "", **facts, "name": name})
-        known = {str(key): float(value) for key, value in kind.options.items()}
-    except (ValueError, TypeError, AttributeError, RecursionError):
-        kind, known, origin = PlannerKind(name, "", ""), {}, "a package that is not named"
-    given = {part.partition("=")[0]: math.nan for part in options.split()}
-    _RECORDED[name] = replace(kind, options={**given, **known}), origin
-
-
-def absent_origin(name: str) -> str:
-    """Where a kind is from that only stands in for one that is not installed; "" of any other."""
-    absent = name in _RECORDED and name not in installed_kinds()
-    return _RECORDED[name][1] if absent else ""
+    return BUILT_IN.get(name) or _find_plugin(name)
 
 
 def installed_kinds() -> tuple[str, ...]:
@@ -170,11 +129,8 @@ def load_builder(kind: PlannerKind, reference: str) -> Any:
     """What a kind's `build` or `build_team` names.
 
     Raises:
-        ConfigError: there is no such module or function, or it cannot be imported, or the kind is
-            that of a recording and not installed.
+        ConfigError: there is no such module or function, or it cannot be imported.
     """
-    if origin := absent_origin(kind.name):
-        raise ConfigError(_KEY, repr(kind.name), "a kind that is installed", f"install {origin}")
     module, _, name = reference.partition(":")
     try:
         return getattr(import_module(module), name)
@@ -194,17 +150,17 @@ def read_options(kind: PlannerKind, text: str) -> dict[str, float]:
     """
     given: dict[str, float] = {}
     for part in text.split():
-        name, equals, number = part.partition("=")
+        name, _, number = part.partition("=")
         if name not in kind.options:
-            raise ConfigError(
-                "planner.options",
-                repr(part),
-                f"options of {kind.name}: {', '.join(kind.options) or 'it has none'}",
-                did_you_mean(name, kind.options),
-            )
+            known = f"options of {kind.name}: {', '.join(kind.options) or 'it has none'}"
+            hint = did_you_mean(name, kind.options)
+            raise ConfigError("planner.options", repr(part), known, hint)
         if name in given:
             raise ConfigError("planner.options", f"{name} twice", "each option once")
-        given[name] = _read_number(number) if equals else math.nan
+        try:
+            given[name] = float(number)
+        except ValueError:
+            given[name] = math.nan
         if not math.isfinite(given[name]):
             raise ConfigError("planner.options", repr(part), f"{name}=NUMBER, a finite one")
     return {**kind.options, **given}
@@ -239,12 +195,8 @@ def _find_plugin(name: str) -> PlannerKind:
     except Exception as error:
         raise _import_error(name, entry.value, error) from error
     if not isinstance(kind, PlannerKind) or kind.name != name:
-        raise ConfigError(
-            _KEY,
-            f"{entry.value} of {_distribution_of(entry)}: {kind!r:.80}",
-            f"a PlannerKind named {name!r}",
-            f"an entry point of {GROUP} leads to something else",
-        )
+        got = f"{entry.value} of {_distribution_of(entry)}: {kind!r:.80}"
+        raise ConfigError(_KEY, got, f"a PlannerKind named {name!r}")
     return kind
 
 
@@ -253,21 +205,13 @@ def _find_entry(name: str) -> EntryPoint:
     entries: list[EntryPoint] = [*entry_points(group=GROUP, name=name)]
     if not entries:
         known = installed_kinds()
-        raise ConfigError(
-            _KEY,
-            repr(name),
-            f"one of {', '.join(known)}",
-            did_you_mean(name, known)
-            or f"install the package that has it: an entry point {name!r} of the group {GROUP}",
-        )
+        install = f"install the package that has it: an entry point {name!r} of the group {GROUP}"
+        hint = did_you_mean(name, known) or install
+        raise ConfigError(_KEY, repr(name), f"one of {', '.join(known)}", hint)
     owners = sorted({_distribution_of(entry) for entry in entries})
     if len(owners) > 1:
-        raise ConfigError(
-            _KEY,
-            f"{name!r} of {' and of '.join(owners)}",
-            "one package that has it",
-            "uninstall the other",
-        )
+        got = f"{name!r} of {' and of '.join(owners)}"
+        raise ConfigError(_KEY, got, "one package that has it", "uninstall the other")
     return entries[0]
 
 
@@ -277,19 +221,9 @@ def _distribution_of(entry: EntryPoint) -> str:
 
 def _import_error(name: str, reference: str, error: Exception) -> ConfigError:
     owner = "quadriga" if name in BUILT_IN else _distribution_of(_find_entry(name))
-    return ConfigError(
-        _KEY,
-        f"{name!r}, whose {reference} of {owner} raises {type(error).__name__}: {error}",
-        "a planner that can be imported",
-        "reinstall the package with what it needs, or choose another kind",
-    )
-
-
-def _read_number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        return math.nan
+    got = f"{name!r}, whose {reference} of {owner} raises {type(error).__name__}: {error}"
+    cause = "reinstall the package with what it needs, or choose another kind"
+    return ConfigError(_KEY, got, "a planner that can be imported", cause)
 
 
 def _files_of(top: str) -> list[tuple[Path, str]]:

@@ -1,24 +1,39 @@
-"""JSON schema of every message type, stored with each recording so that any reader knows it."""
+"""What messages look like, for other programs: JSON schemas, their digests, and a page.
+
+Each recording holds the schemas of its messages, so that any reader knows them.
+`python -m quadriga.shared.schema` prints the page.
+"""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from dataclasses import fields
 from functools import cache
 from hashlib import sha256
 from typing import Any
 
 from quadriga.shared.messages import Message
+from quadriga.shared.topic import CONFIGURED, Topic
 from quadriga.shared.topics import TABLE
 
-_PLAIN = {
-    bool: "boolean",
-    int: "integer",
-    float: "number",
-    str: "string",
-    list: "array",
-    dict: "object",
+_PLAIN: dict[type, str] = {
+    **{bool: "boolean", int: "integer", float: "number"},
+    **{str: "string", list: "array", dict: "object"},
 }
+_HEAD = """\
+# Topics and messages
+
+The messages between the processes of a team. A key on the bus is `<team>/<robot>/<topic>` where a
+topic is one per robot, else `<team>/<topic>`; the planner and the sim server (or each robot's
+plant, `plant_r1` …) have a `status` under their own names. Every message also carries `tick` [ms]
+and `stamp_ns` [ns], the world's time of its content. Periods and ages are world time; the last
+column tells what is recorded.
+This page is generated: `python -m quadriga.shared.schema > docs/messages.md`.
+
+| topic | per robot | message | from | to | period | maximum age | recorded |
+|---|---|---|---|---|---|---|---|
+"""
 
 
 @cache
@@ -55,9 +70,49 @@ def json_schema(kind: type[Message]) -> dict[str, Any]:
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": f"quadriga.{kind.__name__}",
-        "description": (kind.__doc__ or "").strip().splitlines()[0],
+        "description": _summary(kind),
         "type": "object",
         "properties": properties,
         "required": list(properties),
         "additionalProperties": False,
     }
+
+
+def to_markdown() -> str:
+    """The page: the table of topics, then a table for each message."""
+    rows = "".join(f"| {' | '.join(_row(topic))} |\n" for topic in TABLE)
+    return _HEAD + rows + "".join(map(_section, dict.fromkeys(topic.type for topic in TABLE)))
+
+
+def _row(topic: Topic) -> Iterator[str]:
+    yield f"`{topic.name}`"
+    yield "yes" if topic.per_robot else ""
+    yield f"[{topic.type.__name__}](#{topic.type.__name__.lower()})"
+    yield ", ".join(topic.senders)
+    yield ", ".join(topic.receivers)
+    for ms, nothing in ((topic.period_ms, "on event"), (topic.max_age_ms, "")):
+        yield "configured" if ms == CONFIGURED else f"{ms} ms" if ms else nothing
+    yield "yes" if topic.recorded else "no"
+
+
+def _section(kind: type[Message]) -> str:
+    lines = ["", f"## {kind.__name__}", "", _summary(kind), ""]
+    own = [item for item in fields(kind) if item.name not in ("tick", "stamp_ns")]
+    if own:
+        lines += ["| field | shape | unit | frame, or meaning |", "|---|---|---|---|"]
+    for item in own:
+        meta = item.metadata
+        if "shape" in meta:
+            shape = " × ".join(map(str, meta["shape"]))
+            lines.append(f"| `{item.name}` | {shape} | {meta['unit']} | {meta['frame']} |")
+        else:
+            lines.append(f"| `{item.name}` | {meta['kind'].__name__} | | {meta['doc']} |")
+    return "\n".join(lines) + "\n"
+
+
+def _summary(kind: type[Message]) -> str:
+    return (kind.__doc__ or "").strip().splitlines()[0]
+
+
+if __name__ == "__main__":
+    print(to_markdown(), end="")

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import entry_points
 from typing import Any, Final
 
 from quadriga.shared.errors import ConfigError
@@ -16,13 +16,8 @@ from quadriga.shared.members import ESTOP, LAUNCHER, ROLES
 from quadriga.shared.messages import Message
 
 CONFIGURED: Final = -1  # a time that the configuration says: see `quadriga.shared.config.timing`
-GROUP: Final = "quadriga.topics"
 _NAME: Final = re.compile(r"[A-Za-z0-9_.-]+(/[A-Za-z0-9_.-]+)*")
 _TAKERS: Final = frozenset({LAUNCHER, ESTOP, *(role.name for role in ROLES)})
-_ALONE: Final = (
-    "the row stands in a module that imports no more of this project than "
-    "quadriga.shared.topic and .messages"
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,42 +66,34 @@ def plugin_topics(own: Sequence[Topic]) -> tuple[Topic, ...]:
         ConfigError: an entry point cannot be imported or is no row, or its row is like another.
     """
     rows = list(own)
-    for entry in sorted(entry_points(group=GROUP), key=lambda entry: (entry.name, entry.value)):
-        row = _load(entry)
-        wrong = _objection(row, rows)
-        if wrong:
-            raise ConfigError(_origin(entry), *wrong)
+    entries = entry_points(group="quadriga.topics")
+    for entry in sorted(entries, key=lambda entry: (entry.name, entry.value)):
+        dist = f" of {entry.dist.name} {entry.dist.version}" if entry.dist else ""
+        name = f"entry point {entry.name} = {entry.value} in quadriga.topics{dist}"
+        try:
+            row = entry.load()
+        except Exception as error:
+            got = f"{type(error).__name__}: {error}"
+            cause = "its module may import quadriga.shared.topic and .messages, and nothing else"
+            raise ConfigError(name, got, "a row that can be imported", cause) from error
+        if wrong := _objection(row, rows):
+            raise ConfigError(name, *wrong)
         rows.append(row)
     return tuple(rows[len(own) :])
 
 
-def _load(entry: EntryPoint) -> Any:
-    try:
-        return entry.load()
-    except Exception as error:
-        got = f"{type(error).__name__}: {error}"
-        raise ConfigError(_origin(entry), got, "a row that can be imported", _ALONE) from error
-
-
-def _objection(row: Any, rows: Sequence[Topic]) -> tuple[str, str, str] | None:
-    """What is wrong with a row beside those before it: got, expected, cause; None: nothing."""
+def _objection(row: Any, rows: Sequence[Topic]) -> tuple[str, str] | None:
+    """What is wrong with a row beside those before it: got, expected; None: nothing."""
     if not isinstance(row, Topic):
-        return repr(row)[:80], "a Topic of quadriga.shared.topic", ""
+        return repr(row)[:80], "a Topic of quadriga.shared.topic"
     if not (isinstance(row.type, type) and issubclass(row.type, Message)):
-        return repr(row.type)[:80], "a Message of quadriga.shared.messages", ""
+        return repr(row.type)[:80], "a Message of quadriga.shared.messages"
     if not _NAME.fullmatch(row.name) or row.name in {other.name for other in rows}:
-        return repr(row.name), "a name of its own, such as 'wind' or 'weather/wind'", ""
+        return repr(row.name), "a name of its own, such as 'wind' or 'weather/wind'"
     if row.type.__name__ in {other.type.__name__ for other in rows}:
-        return row.type.__name__, "a message type with a name of its own", "schemas have it"
+        return row.type.__name__, "a message type with a name of its own: schemas have it"
     if row.period_ms < 0 or row.max_age_ms < 0:
-        got = f"period_ms {row.period_ms}, max_age_ms {row.max_age_ms}"
-        return got, "at least 0", "the configuration knows no times of other packages' topics"
-    taken = sorted(_TAKERS & {*row.receivers})
-    if taken:
-        return ", ".join(taken), "receivers of its own", "these take only what they know"
+        return f"period_ms {row.period_ms}, max_age_ms {row.max_age_ms}", "at least 0"
+    if taken := sorted(_TAKERS & {*row.receivers}):
+        return ", ".join(taken), "receivers of its own: these take only what they know"
     return None
-
-
-def _origin(entry: EntryPoint) -> str:
-    dist = f" of {entry.dist.name} {entry.dist.version}" if entry.dist else ""
-    return f"entry point {entry.name} = {entry.value} in {GROUP}{dist}"

@@ -1,6 +1,5 @@
 """The table of topics: key, message type, period, maximum age, who sends it and who takes it.
 
-What the entries of a message's arrays are called stands with its fields, in `shared.messages`.
 Other packages add rows of their own, see `shared.topic.plugin_topics`.
 """
 
@@ -56,24 +55,16 @@ RESET: Final = Topic(
     "reset", msg.Reset, (OPERATOR, members.RESET), (AGENT, SIM), period_ms=0, repeats=True
 )
 RESUME: Final = Topic(
-    "resume",
-    msg.Resume,
-    (OPERATOR, members.RESET, members.RESUME),
-    (AGENT,),
-    period_ms=0,
-    repeats=True,
-)
+    "resume", msg.Resume, (OPERATOR, members.RESET, members.RESUME), (AGENT,),
+    period_ms=0, repeats=True,
+)  # fmt: skip
 REQUESTS: Final = (ESTOP, STOP, RESET, RESUME)  # of people, who may not know the team's time
 LIVE_FAULT: Final = Topic("fault", msg.LiveFault, (LAUNCHER,), (SIM,), period_ms=0, repeats=True)
 TRUTH: Final = Topic("sim/truth", msg.Truth, (SIM,), (AGENT, LAUNCHER), period_ms=CONFIGURED)
 EVENT: Final = Topic(
-    "sim/event",
-    msg.Event,
-    (SIM,),
-    (*_PLANS, OPERATOR, LAUNCHER, *_SPEAKERS, SIM),
-    period_ms=0,
-    repeats=True,
-)
+    "sim/event", msg.Event, (SIM,), (*_PLANS, OPERATOR, LAUNCHER, *_SPEAKERS, SIM),
+    period_ms=0, repeats=True,
+)  # fmt: skip
 # What an agent tells of itself beside its status; never of the kind `stop`, which ends a walk.
 AGENT_EVENT: Final = Topic(
     "event", msg.Event, (AGENT,), (LAUNCHER,), per_robot=True, period_ms=0, repeats=True

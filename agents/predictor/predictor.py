@@ -29,9 +29,8 @@ from quadriga.agents.predictor.regression import (
     to_physical,
 )
 from quadriga.shared.config.sections import Config
-from quadriga.shared.config.yokes import neighbours
 from quadriga.shared.errors import PredictorError, did_you_mean
-from quadriga.shared.robots.conventions import Array
+from quadriga.shared.robots.conventions import Array, neighbours
 from quadriga.shared.topics import SAMPLE_MS
 
 KINDS: Final = ("pinv", "ridge", "periodic")  # of fits

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from quadriga.commands.command import AddCommand, Given
 from quadriga.commands.options import add_no_render
-from quadriga.shared.config.reference import BY_HAND
-from quadriga.shared.config.sections import BRIDGED, Config
+from quadriga.shared.config.sections import BRIDGED, BY_HAND, Config
 from quadriga.shared.errors import ConfigError
 
 if TYPE_CHECKING:

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from quadriga.shared.agent_command import ENVIRONMENT
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
-from quadriga.shared.controller_line import ENVIRONMENT
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.robots.conventions import robot_names
 

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from quadriga.agents.predictor.predictor import KINDS
+from quadriga.shared.agent_command import KEY as CONTROLLER
 from quadriga.shared.config.load import flatten, parse_assignment, read_toml
-from quadriga.shared.controller_line import KEY as CONTROLLER
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.planner_kinds import BUILT_IN, find_kind, installed_kinds
 

@@ -10,9 +10,8 @@ from typing import Any, Final
 import numpy as np
 
 from quadriga.shared.config.sections import Config
-from quadriga.shared.config.yokes import yoke_pairs
 from quadriga.shared.messages import Message
-from quadriga.shared.robots.conventions import Array, robot_names
+from quadriga.shared.robots.conventions import Array, robot_names, yoke_pairs
 
 _SAMPLES: Final = "N"  # the axis of the horizon: one row per entry
 

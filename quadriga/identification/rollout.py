@@ -15,8 +15,8 @@ from quadriga.agents.planner.team_planner import Collected, TeamPlanner
 from quadriga.agents.planning.remote import central_latency
 from quadriga.agents.planning.team import Central, CentralState
 from quadriga.agents.predictor.predictor import Predictor
+from quadriga.shared.agent_command import KEY as CONTROLLER
 from quadriga.shared.config.sections import Config
-from quadriga.shared.controller_line import KEY as CONTROLLER
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.members import PLANNER
 from quadriga.shared.messages import Event, Measurement, Plan, Reference

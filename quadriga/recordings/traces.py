@@ -16,7 +16,6 @@ from quadriga.recordings.gaps import Span
 from quadriga.recordings.truth import Ticks, TruthTrace, build_truth_trace, stack, ticks_of
 from quadriga.shared.codec import decode
 from quadriga.shared.config.sections import Config
-from quadriga.shared.config.yokes import yoke_pairs
 from quadriga.shared.errors import MessageError, RecordingError
 from quadriga.shared.members import PLANNER, SIM, plant_name
 from quadriga.shared.messages import (
@@ -31,7 +30,7 @@ from quadriga.shared.messages import (
 )
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.robots.conventions import OUTPUTS, Array, robot_names
+from quadriga.shared.robots.conventions import OUTPUTS, Array, robot_names, yoke_pairs
 from quadriga.shared.topics import COMMAND, INPUTS, STATE, Topic, find_topic
 
 # Up to 1 kHz each: only their ticks are read. What an agent took in is read of walks in real time,

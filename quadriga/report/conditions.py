@@ -23,10 +23,9 @@ from quadriga.report.window import (
     find_lost_stance,
     passive_since,
 )
-from quadriga.shared.config.yokes import yoke_pairs
 from quadriga.shared.messages import Plan
 from quadriga.shared.planner_kinds import find_kind
-from quadriga.shared.robots.conventions import N_LEGS, Leg
+from quadriga.shared.robots.conventions import N_LEGS, Leg, yoke_pairs
 from quadriga.shared.topics import REFERENCE, SAMPLE_MS
 
 _AT_LIMIT: Final = 0.99  # share of a planned force's limit

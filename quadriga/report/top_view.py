@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from quadriga.charts.colours import LINES, PALETTE, robot_style, yoke_style
 from quadriga.charts.draw import POINTS_PER_INCH, TEXT, WIDTH, add_legend, add_title, tidy_axes
 from quadriga.recordings.traces import Traces
-from quadriga.shared.config.yokes import yoke_pairs
 from quadriga.shared.robots.colours import robot_colour
-from quadriga.shared.robots.conventions import Array
+from quadriga.shared.robots.conventions import Array, yoke_pairs
 
 _INSTANTS: Final = 6  # at which yokes and times are drawn
 _MARGIN: Final = 0.3  # m

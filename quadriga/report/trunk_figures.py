@@ -15,8 +15,7 @@ from quadriga.recordings.traces import demanded_outputs, estimate_errors
 from quadriga.recordings.truth import Ticks
 from quadriga.report.run import ReportedRun
 from quadriga.shared.codes import FALL
-from quadriga.shared.config.yokes import yoke_pairs
-from quadriga.shared.robots.conventions import OUTPUTS, Array
+from quadriga.shared.robots.conventions import OUTPUTS, Array, yoke_pairs
 from quadriga.shared.topics import SAMPLE_MS
 from quadriga.tables import LABELS, UNITS
 

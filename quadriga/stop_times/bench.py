@@ -17,8 +17,7 @@ from quadriga.drive.client import ControlLink, socket_path
 from quadriga.drive.driver_words import WHERE
 from quadriga.drive.wish import standing
 from quadriga.identification.predictors import ensure_predictor
-from quadriga.shared.config.reference import BY_HAND
-from quadriga.shared.config.sections import Config
+from quadriga.shared.config.sections import BY_HAND, Config
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.errors import BusError, ProcessError
 from quadriga.shared.members import OPERATOR

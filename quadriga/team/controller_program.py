@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Final, NoReturn
 
+from quadriga.shared.agent_command import KEY, environment_of, fill_in, parse_line
 from quadriga.shared.config.sections import Config
-from quadriga.shared.controller_line import KEY, environment_of, fill_in, parse_line
 from quadriga.shared.errors import ConfigError, system_reason
 
 _PYTHON: Final = "python"  # the interpreter that this project runs in

@@ -8,8 +8,7 @@ from rich.console import Console
 
 from quadriga.drive.client import ControlLink, socket_path
 from quadriga.drive.driver_words import WHERE
-from quadriga.shared.config.reference import BY_HAND
-from quadriga.shared.config.sections import Config
+from quadriga.shared.config.sections import BY_HAND, Config
 from quadriga.shared.errors import BusError
 from quadriga.shared.runtime.places import runtime_dir
 

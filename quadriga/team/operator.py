@@ -16,9 +16,8 @@ from quadriga.shared.bus.discovery import REJOINS, join
 from quadriga.shared.bus.liveness import Liveness
 from quadriga.shared.bus.session import POLL, READY, Bus
 from quadriga.shared.codec import decode, encode
-from quadriga.shared.config.reference import BY_HAND
 from quadriga.shared.config.reference_trace import trace_of
-from quadriga.shared.config.sections import Config
+from quadriga.shared.config.sections import BY_HAND, Config
 from quadriga.shared.errors import MessageError
 from quadriga.shared.messages import Clock, Event, Reference
 from quadriga.shared.runtime.places import make_runtime_dir

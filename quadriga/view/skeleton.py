@@ -7,7 +7,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from quadriga.shared.config.motors import MotorsConfig
+from quadriga.shared.config.sections import MotorsConfig
 from quadriga.shared.robots.conventions import FOOT_FRAMES, Array
 from quadriga.shared.robots.spec import RobotSpec
 from quadriga.sim_server.world.layout import ATTITUDE, JOINT_POSITIONS, NQ, POSITION

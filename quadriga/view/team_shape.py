@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from quadriga.shared.config.sections import Config
-from quadriga.shared.config.yokes import yoke_pairs
-from quadriga.shared.robots.conventions import Array, robot_names
+from quadriga.shared.robots.conventions import Array, robot_names, yoke_pairs
 from quadriga.sim_server.terrain.terrain import Terrain
 from quadriga.sim_server.world.scenario import build_loads
 from quadriga.sim_server.world.team_model import build_terrain, spawn_positions

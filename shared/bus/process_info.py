@@ -10,8 +10,8 @@ from typing import Final
 from quadriga.shared.about import ABOUT, STARTED, About, scheduling_of, stage_of
 from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.codec import encode
-from quadriga.shared.config.agreed import agreed_keys
 from quadriga.shared.config.sections import Config
+from quadriga.shared.config.write import agreed_keys
 from quadriga.shared.members import RECORDER
 from quadriga.shared.runtime.clock import wall_ns
 from quadriga.shared.runtime.installed import (

@@ -9,15 +9,15 @@ from typing import Final
 from quadriga.shared.config.sections import BusConfig
 from quadriga.shared.errors import ConfigError
 
-TLS: Final = "tls"
 _ANY_PORT: Final = re.compile(r":0+(?=[?#]|$)")
+_TLS: Final = "tls/HOST:PORT"
 # Protocols of Zenoh that reach other machines; what it does not know it refuses itself.
 _NETWORK: Final = ("tcp", "udp", "quic", "quic_datagram", "ws", "vsock", "serial")
 
 
 def is_tls(endpoint: str) -> bool:
     """Whether an endpoint is one of mutual TLS."""
-    return endpoint.startswith(f"{TLS}/")
+    return endpoint.startswith("tls/")
 
 
 def host_and_port(endpoint: str) -> tuple[str, int]:
@@ -26,12 +26,15 @@ def host_and_port(endpoint: str) -> tuple[str, int]:
     Raises:
         ConfigError: it is not of this form.
     """
-    address = endpoint.partition("/")[2]
-    host, _, port = address.rpartition(":")
-    host = host.removeprefix("[").removesuffix("]")
+    host, port = _split(endpoint.partition("/")[2])
     if not host or not port.isdecimal() or int(port) > 65535:
-        raise ConfigError("bus.endpoint", repr(endpoint), f"{TLS}/HOST:PORT")
+        raise ConfigError("bus.endpoint", repr(endpoint), _TLS)
     return host, int(port)
+
+
+def _split(address: str) -> tuple[str, str]:
+    host, _, port = address.rpartition(":")
+    return host.removeprefix("[").removesuffix("]"), port
 
 
 def is_loopback(endpoint: str) -> bool:
@@ -39,12 +42,9 @@ def is_loopback(endpoint: str) -> bool:
     protocol, _, address = endpoint.partition("/")
     if protocol not in _NETWORK or not address:
         return True
-    host = address.partition("?")[0].partition("#")[0].rpartition(":")[0]
-    host = host.removeprefix("[").removesuffix("]")
-    if host == "localhost":
-        return True
+    host, _ = _split(re.split("[?#]", address)[0])
     try:
-        return ip_address(host).is_loopback
+        return host == "localhost" or ip_address(host).is_loopback
     except ValueError:
         return False
 
@@ -76,7 +76,7 @@ def check_exposure(bus: BusConfig, name: str, endpoint: str) -> None:
         host_and_port(endpoint)
         if "#" in endpoint or "?" in endpoint:
             cause = "the certificates are those of bus.certificates"
-            raise ConfigError(name, repr(endpoint), f"{TLS}/HOST:PORT without settings", cause)
+            raise ConfigError(name, repr(endpoint), f"{_TLS} without settings", cause)
         if bus.mode != "client":
             cause = "only a router checks who may send what"
             raise ConfigError("bus.mode", f"{bus.mode!r} with {endpoint}", "'client'", cause)
@@ -84,7 +84,7 @@ def check_exposure(bus: BusConfig, name: str, endpoint: str) -> None:
         raise ConfigError(
             name,
             repr(endpoint),
-            f"{TLS}/HOST:PORT with bus.mode = 'client', or an address of the loopback",
+            f"{_TLS} with bus.mode = 'client', or an address of the loopback",
             "whoever reaches another endpoint commands the robots: see docs/security.md; "
             "bus.plaintext = true accepts that",
         )

@@ -18,6 +18,7 @@ from quadriga.shared.runtime.places import scenario_folder
 
 COLUMNS: Final = ("t", "vx", "vy", "wz")
 ROW_END: Final = ";"  # where a trace stands in a configuration, in one line
+_KEY: Final = "reference.trace"
 _STREAM: Final = 6  # of the seed
 _READABLE: Final = "a file that can be read"
 
@@ -64,7 +65,7 @@ def trace_sha256(config: Config) -> str:
         ConfigError: the file cannot be read.
     """
     path = _trace_file(config)
-    with name_file_errors(ConfigError, f"reference.trace {path}", _READABLE):
+    with name_file_errors(ConfigError, f"{_KEY} {path}", _READABLE):
         return "" if path is None else hashlib.sha256(path.read_bytes()).hexdigest()
 
 
@@ -75,7 +76,7 @@ def inline_trace(path: Path) -> str:
         ConfigError: the file cannot be read, or is no trace.
     """
     rows = _split_rows(_read_text(path))
-    _parse_values(f"reference.trace {path}", rows)
+    _parse_values(f"{_KEY} {path}", rows)
     return ROW_END.join(",".join(row) for row in rows)
 
 
@@ -86,10 +87,7 @@ def _trace_file(config: Config) -> Path | None:
         return None
     if "/" in name:  # of a recording from elsewhere: what it names here is something else
         raise ConfigError(
-            "reference.trace",
-            repr(name),
-            "the trace itself, or the name of one beside the scenarios",
-            "recorded before traces were kept",
+            _KEY, repr(name), "the trace itself, or the name of one beside the scenarios"
         )
     return scenario_folder() / name
 
@@ -97,13 +95,13 @@ def _trace_file(config: Config) -> Path | None:
 @lru_cache(maxsize=8)
 def _read_trace(path: Path | None, given: str, begin: float) -> Trace:
     text = given.replace(ROW_END, "\n") if path is None else _read_text(path)
-    values = _parse_values(f"reference.trace{f' {path}' if path else ''}", _split_rows(text))
+    values = _parse_values(f"{_KEY} {path}" if path else _KEY, _split_rows(text))
     values.setflags(write=False)
     return Trace(values[:, 0], values[:, 1:], begin)
 
 
 def _read_text(path: Path) -> str:
-    with name_file_errors(ConfigError, f"reference.trace {path}", _READABLE):
+    with name_file_errors(ConfigError, f"{_KEY} {path}", _READABLE):
         return path.read_text(encoding="utf-8-sig")  # as spreadsheets write it
 
 
@@ -122,22 +120,13 @@ def _parse_values(name: str, rows: list[list[str]]) -> Array:
         raise ConfigError(name, str(error), "four numbers a line") from None
     if values.ndim != 2 or values.shape[1] != len(COLUMNS) or len(values) < 2:
         raise ConfigError(name, f"numbers of shape {values.shape}", "at least two lines of four")
-    _check(name, values)
-    return values
-
-
-def _check(name: str, values: Array) -> None:
     t = values[:, 0]
     if not np.isfinite(values).all() or t[0] != 0.0 or (np.diff(t) <= 0.0).any():
-        raise ConfigError(
-            name, f"times from {t[0]:g} to {t[-1]:g}", "finite numbers, t rising from 0"
-        )
-    for column, key in enumerate(COLUMNS[1:], start=1):
+        got = f"times from {t[0]:g} to {t[-1]:g}"
+        raise ConfigError(name, got, "finite numbers, t rising from 0")
+    for column, key in zip(values[:, 1:].T, COLUMNS[1:], strict=True):
         limits = ReferenceConfig.__dataclass_fields__[key].metadata
-        low, high = values[:, column].min(), values[:, column].max()
-        if low < limits["low"] or high > limits["high"]:
-            raise ConfigError(
-                name,
-                f"{key} of {low:g} … {high:g}",
-                f"{limits['low']:g} … {limits['high']:g} {limits['unit']}",
-            )
+        if column.min() < limits["low"] or column.max() > limits["high"]:
+            expected = f"{limits['low']:g} … {limits['high']:g} {limits['unit']}"
+            raise ConfigError(name, f"{key} of {column.min():g} … {column.max():g}", expected)
+    return values

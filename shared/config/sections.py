@@ -1,48 +1,576 @@
-"""The whole configuration: frozen dataclasses; every key has a default, a unit and limits."""
+"""The whole configuration: one dataclass a section; each key has a default, a unit and limits."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from math import inf
+from typing import Any, Final
 
-from quadriga.shared.config.bridge import BridgeConfig
-from quadriga.shared.config.identification import IdentificationConfig
-from quadriga.shared.config.low_level import ControllerConfig, EstimatorConfig, GaitConfig
-from quadriga.shared.config.motors import MotorsConfig
-from quadriga.shared.config.planner import PlannerConfig
-from quadriga.shared.config.reference import ReferenceConfig
-from quadriga.shared.config.sensors import SensorsConfig
-from quadriga.shared.config.team import (
-    BRIDGED,
-    SIMULATED,
-    BusConfig,
-    RecorderConfig,
-    RuntimeConfig,
-    TeamConfig,
-)
-from quadriga.shared.config.world import WorldConfig
+from quadriga.shared.config.terrains import TERRAINS, terrain_meanings
 from quadriga.shared.errors import ConfigError
+from quadriga.shared.planner_kinds import BUILT_IN, find_kind, read_options
 from quadriga.shared.robots.registry import ROBOTS
 from quadriga.shared.robots.spec import RobotSpec
 
-__all__ = [
-    "BRIDGED",
-    "SIMULATED",
-    "BridgeConfig",
-    "BusConfig",
-    "Config",
-    "ControllerConfig",
-    "EstimatorConfig",
-    "GaitConfig",
-    "IdentificationConfig",
-    "MotorsConfig",
-    "PlannerConfig",
-    "RecorderConfig",
-    "ReferenceConfig",
-    "RuntimeConfig",
-    "SensorsConfig",
-    "TeamConfig",
-    "WorldConfig",
-]
+SIMULATED: Final = "mujoco"  # the kind of plant that is a simulated world
+BRIDGED: Final = "robots"  # the kind that is robots of their own, each behind a bridge
+CONFIGURED: Final = "configured"  # the operator asks for what [reference] says
+BY_HAND: Final = "hand"  # for what a person asks
+Numbers = tuple[float, ...]
+
+
+def number(default: Any, unit: str, low: float, high: float, doc: str) -> Any:
+    """A key that is a number, or as many of them as its default has.
+
+    Args:
+        default: its value where nothing else is said; the type of all others.
+        unit: of the value; "-" or "1" without one.
+        low: least value.
+        high: greatest value.
+        doc: what it means.
+    """
+    return _key(default, doc, unit=unit, low=low, high=high)
+
+
+def text(default: str, doc: str) -> Any:
+    """A key that is any text of one line."""
+    return _key(default, doc)
+
+
+def choice(choices: tuple[str, ...], doc: str, more: str = "") -> Any:
+    """A key that is one of some words, the first by default.
+
+    With `more`, which says what else there may be, the check of the whole configuration decides.
+    """
+    return _key(choices[0], doc, choices=choices, more=more)
+
+
+def flag(default: bool, doc: str) -> Any:
+    """A key that is true or false."""
+    return _key(default, doc)
+
+
+def _key(
+    default: Any,
+    doc: str,
+    unit: str = "-",
+    low: float = -inf,
+    high: float = inf,
+    choices: tuple[str, ...] = (),
+    more: str = "",
+) -> Any:
+    meta = {"doc": doc, "unit": unit, "low": low, "high": high, "choices": choices, "more": more}
+    return field(default=default, metadata=meta)
+
+
+@dataclass(frozen=True, slots=True)
+class TeamConfig:
+    """The robots of the team."""
+
+    name: str = text("team", "first part of every key; teams on one network need own names")
+    robots: int = number(3, "1", 1, 10, "number of robots r1 … rn")
+    robot: str = choice(tuple(ROBOTS), "kind of all robots of the team")
+    yokes: str = choice(("complete", "chain", "ring", "none"), "which pairs are yoked")
+    spacing: float = number(0.9, "m", 0.6, 3.0, "distance between neighbours at the start")
+    alternate_phase: bool = flag(True, "every second robot trots half a gait period later")
+    auto_resume: bool = flag(
+        False,
+        "robots that stand because an input was lost walk again once all have been whole for "
+        "resume_after; false: only once the operator says so (quadriga resume)",
+    )
+    # More would outlast the operator's request, which is obeyed for 5 s.
+    resume_after: float = number(
+        1.0, "s", 0.2, 4.0, "how long all inputs must have been whole before a robot walks again"
+    )
+    plant: str = text(SIMULATED, "mujoco; robots: real ones behind bridges; or a plug-in's kind")
+    plant_per_robot: bool = flag(False, "every robot has a plant of its own; false: one for all")
+    agent_command: str = text(
+        "",
+        "command line of a program of one's own that is the agent of each robot, see "
+        "docs/tutorials/own_controller.md; empty: the project's own agents",
+    )
+
+    @property
+    def one_world(self) -> bool:
+        """Whether the plant is one simulated world of all robots: it knows the truth of all."""
+        return self.plant == SIMULATED and not self.plant_per_robot
+
+
+@dataclass(frozen=True, slots=True)
+class BusConfig:
+    """How the processes reach each other over Zenoh."""
+
+    mode: str = choice(("peer", "client"), "peer: processes connect directly; client: by a router")
+    endpoint: str = text(
+        "tcp/127.0.0.1:7447",
+        "where the sim server, or plant_r1, listens (peer) or the router is (client); off the "
+        "loopback tls/HOST:PORT",
+    )
+    listen: str = text("tcp/127.0.0.1:0", "peer: where all others listen; port 0: any free one")
+    certificates: str = text(
+        "certs", "tls/HOST:PORT: folder with a folder for each process, see docs/security.md"
+    )
+    plaintext: bool = flag(
+        False, "permit others than tls off the loopback: whoever reaches them commands the robots"
+    )
+    barrier_timeout: float = number(60.0, "s", 0.1, 3600.0, "how long to wait for all processes")
+    reconnect_timeout: float = number(
+        30.0,
+        "s",
+        0.0,
+        600.0,
+        "client mode, realtime, one plant: how long processes wait for a router that is gone to be "
+        "back, before they leave; meanwhile simulated robots are led down",
+    )
+    clock_timeout: float = number(
+        0.5, "s", 0.3, 10.0, "realtime: age of a plant's newest message at which the walk ends"
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class WorldConfig:
+    """The simulated world and its seeded disturbances."""
+
+    mode: str = choice(("lockstep", "realtime"), "lockstep waits for all commands")
+    seed: int = number(0, "-", 0, 2**31, "seed of terrain, noise and everything else random")
+    duration: float = number(20.0, "s", 0.5, 3600.0, "world time to walk")
+    scenario: str = text("", "name of the scenario these keys come from: a label only")
+    initial_posture: str = choice(
+        ("standing", "lying"), "how simulated robots begin; lying: on their feet with folded legs"
+    )
+    scatter: float = number(0.0, "m", 0.0, 0.1, "how far off its place a robot may start, seeded")
+    terrain: str = choice(tuple(TERRAINS), f"kind of ground; {terrain_meanings()}")
+    terrain_height: float = number(
+        0.05, "m", 0.0, 0.3, "greatest height; of pebbles that of the largest, at least 0.005"
+    )
+    slope: float = number(8.0, "deg", 0.5, 25.0, "terrain slope: grade of the ramps")
+    stairs_rise: float = number(0.06, "m", 0.0, 0.2, "terrain stairs: height of a step")
+    stairs_run: float = number(0.3, "m", 0.1, 2.0, "terrain stairs: depth of a tread")
+    stairs_count: int = number(8, "1", 1, 50, "terrain stairs: steps up, and down again")
+    friction: float = number(0.8, "1", 0.05, 2.0, "friction coefficient of feet on ground")
+    friction_of: str = text("", "robots whose feet find another friction: 'r2:0.3,r3:0.5'")
+    leg_collisions: bool = flag(
+        True, "all links collide with ground and each other; false: only feet and trunks do"
+    )
+    payload: float = number(0.0, "kg", 0.0, 60.0, "load unknown to the agents")
+    payload_on: str = text(
+        "team", "who carries it: 'team' in equal shares, names 'r1,r2', or with shares 'r1:6,r3:4'"
+    )
+    payload_scatter: float = number(
+        0.0, "m", 0.0, 0.15, "how far a load may lie off the trunk's centre along x and y, seeded"
+    )
+    push: str = text(
+        "",
+        "pushes 'robot:force[N]:direction[deg]:start[s]:duration[s]' separated by commas; "
+        "robot may be 'all'; direction 0 is forward, 90 is left",
+    )
+    push_force: float = number(0.0, "N", 0.0, 5000.0, "seeded series of pushes in turn; 0: none")
+    push_spread: float = number(0.0, "1", 0.0, 1.0, "spread of push_force, seeded")
+    push_every: float = number(3.0, "s", 0.1, 600.0, "time between two pushes, before the first")
+    push_duration: float = number(0.2, "s", 1e-3, 10.0, "duration of each push of the series")
+    motor_strength: str = text(
+        "",
+        "motors that weaken: 'robot:joint:start[s]:share' separated by commas; joint as FL_calf, "
+        "calf or FL, either may be 'any', and what is left open is drawn from the seed; share of "
+        "its torque that the motor still gives, 0.6 where none is said",
+    )
+    faults: str = text(
+        "",
+        "faulty sensors and motors, 'robot/component kind start[s] [duration[s]]' separated by "
+        "commas, as 'r2/imu stuck 4 2'; docs/world.md has the components and kinds",
+    )
+    live_faults: bool = flag(False, "quadriga fault --live may make sensors and motors faulty")
+    command_timeout: float = number(
+        10.0, "s wall", 0.05, 60.0, "lockstep: a robot that is silent longer ends the walk"
+    )
+    command_hold_ms: int = number(20, "ms", 1, 1000, "realtime: an older command is held")
+    command_damp_ms: int = number(200, "ms", 1, 10000, "realtime: an older command ends the walk")
+
+    @property
+    def uneven(self) -> bool:
+        """Whether the ground is anything but a plane."""
+        kind = TERRAINS[self.terrain]
+        return bool(kind.builder) and getattr(self, kind.height_key) > 0.0
+
+    @property
+    def ground(self) -> str:
+        """What the ground is, in words."""
+        return TERRAINS[self.terrain].text.format_map(asdict(self))
+
+
+@dataclass(frozen=True, slots=True)
+class SensorsConfig:
+    """Noise and errors of the simulated sensors (standard deviations, where nothing else is said).
+
+    What is drawn once is drawn for each robot, joint and foot from the world's seed. The defaults
+    of accelerometer and feet are the A1's; other robots' records (`shared/robots`) have their own.
+    """
+
+    preset: str = choice(("realistic", "ideal"), "ideal: noise and biases of the IMU alone, feet N")
+    joint_position: float = number(5e-4, "rad", 0.0, 0.1, "encoder noise")
+    joint_offset: float = number(0.01, "rad", 0.0, 0.2, "error of each encoder's zero, drawn once")
+    joint_velocity: float = number(0.05, "rad/s", 0.0, 5.0, "encoder rate noise")
+    joint_torque: float = number(0.1, "N·m", 0.0, 10.0, "torque noise")
+    gyro: float = number(0.01, "rad/s", 0.0, 1.0, "gyro noise")
+    gyro_bias: float = number(0.002, "rad/s", 0.0, 1.0, "gyro bias, drawn once per run")
+    accel: float = number(0.1, "m/s²", 0.0, 10.0, "accelerometer noise")
+    accel_bias: float = number(0.15, "m/s²", 0.0, 5.0, "accelerometer bias, drawn once")
+    orientation: float = number(1e-3, "rad", 0.0, 0.2, "IMU attitude noise")
+    orientation_bias: float = number(0.01, "rad", 0.0, 0.2, "IMU roll and pitch error, drawn once")
+    yaw_drift: float = number(0.002, "rad/s", 0.0, 0.1, "drift of the IMU's yaw, drawn once")
+    foot_sensor: str = choice(
+        ("counts", "newtons", "none"),
+        "what feet measure. counts: raw units with scale, offset, drift and dropouts, held and "
+        "rounded to 16 bits; newtons: N, with noise, never negative; none: always 0",
+    )
+    foot_force: float = number(0.05, "N", 0.0, 50.0, "foot force noise")
+    foot_scale: float = number(12.5, "1/N", 0.01, 50.0, "counts per N, the median of all feet")
+    foot_scale_spread: float = number(0.06, "1", 0.0, 2.0, "of the logarithm of that, drawn once")
+    foot_offset: float = number(120.0, "1", -1e4, 1e4, "counts of an unloaded foot, mean of all")
+    foot_bias: float = number(30.0, "1", 0.0, 1e4, "how far each foot's differ from that, once")
+    foot_drift: float = number(1.5, "1/√s", 0.0, 1e3, "random walk of that, counts after 1 s")
+    foot_refresh_rate: float = number(49.0, "Hz", 1.0, 1e3, "of counts; in between they are held")
+    foot_dropout_rate: float = number(
+        0.05, "1/s", 0.0, 100.0, "how often a foot's sensor fails: it reads 0, or its last value"
+    )
+    foot_dropout_ms: float = number(200.0, "ms", 1.0, 6e4, "how long a failure lasts on average")
+
+
+@dataclass(frozen=True, slots=True)
+class MotorsConfig:
+    """Motors and joints: what the world simulates, and what of it the low level's model has."""
+
+    preset: str = choice(("realistic", "ideal"), "ideal: no friction, inertia, delay, heat")
+    torque_speed: bool = flag(True, "torque falls with the joint's speed, to zero at its limit")
+    friction: float = number(0.4, "N·m", 0.0, 0.8, "dry friction; it needs rotor_inertia = true")
+    viscous_friction: float = number(0.04, "N·m·s/rad", 0.0, 1.0, "viscous friction of the joints")
+    rotor_inertia: bool = flag(True, "the rotors' inertia, as joints feel it behind the gears")
+    bandwidth: float = number(100.0, "Hz", 0.0, 1e4, "corner of a motor's first-order lag; 0: none")
+    delay_ms: int = number(2, "ms", 0, 50, "time from a command until the motors act on it")
+    hard_stops: bool = flag(True, "end stops give way by hardly anything; false: by hundredths")
+    heat_time: float = number(300.0, "s", 0.0, 1e5, "thermal time constant of motors; 0: no heat")
+
+
+@dataclass(frozen=True, slots=True)
+class EstimatorConfig:
+    """The agent's Kalman filter on IMU and leg kinematics."""
+
+    kind: str = choice(("kalman", "truth"), "truth: the simulator's, for comparison only")
+    accel_sigma: float = number(0.3, "m/s²", 1e-4, 100.0, "process noise of the velocity")
+    foot_sigma: float = number(0.05, "m/s", 1e-5, 10.0, "process noise of a stance foot")
+    swing_sigma: float = number(30.0, "m/s", 0.1, 1e3, "process noise of a swing foot")
+    leg_position_sigma: float = number(1.5e-3, "m", 1e-6, 0.5, "leg kinematics, position")
+    leg_velocity_sigma: float = number(0.1, "m/s", 1e-5, 10.0, "leg kinematics, velocity")
+    trust_ramp: float = number(0.3, "1", 0.0, 0.5, "share of stance over which trust rises, falls")
+    tilt_time: float = number(
+        5.0, "s", 0.0, 1e4, "time constant of finding the IMU's tilt and bias by the legs; 0: never"
+    )
+    contact_force: float = number(10.0, "N", 0.0, 200.0, "a foot with less load is not trusted")
+
+
+@dataclass(frozen=True, slots=True)
+class GaitConfig:
+    """The trot."""
+
+    stance_ms: int = number(200, "ms", 50, 1000, "stance time, and swing time (duty 0.5)")
+    stand_ms: int = number(300, "ms", 100, 10000, "stand on four legs before the first step")
+
+
+@dataclass(frozen=True, slots=True)
+class ControllerConfig:
+    """The whole-body QP and the swing legs. The default is the robust setting."""
+
+    preset: str = choice(
+        ("robust", "soft", "plain"),
+        "soft: lets planned forces through; plain: without what keeps a team up on rough ground",
+    )
+    gamma_tau: float = number(1e2, "1", 0.0, 1e9, "gamma_1, weight of torques")
+    gamma_force: float = number(1e3, "1", 0.0, 1e9, "gamma_2, weight of force errors")
+    gamma_defect: float = number(1e6, "1", 1.0, 1e12, "gamma_3, weight of the defect")
+    tilt_length: float = number(0.15, "m", 0.01, 10.0, "angular against linear defect (paper: 1)")
+    swing_weight: float = number(0.3, "1", 0.01, 10.0, "swing feet's against trunk's (paper: 1)")
+    mu: float = number(0.6, "1", 0.05, 2.0, "friction coefficient the QP may use")
+    mu_min: float = number(0.35, "1", 0.05, 2.0, "the least it uses, even while feet slide")
+    mu_slippery: float = number(0.12, "1", 0.02, 2.0, "likewise, where feet that slide show less")
+    mu_recovery: float = number(2.0, "1/s", 0.0, 10.0, "its rate of recovery; below mu_min a tenth")
+    slip_load: float = number(20.0, "N", 0.0, 200.0, "slip detection ignores a foot with less")
+    slip_speed: float = number(0.3, "m/s", 0.0, 5.0, "a faster stance foot slides; 0: never")
+    force_min: float = number(5.0, "N", 0.0, 50.0, "least normal force of a stance foot")
+    kp_z: float = number(400.0, "1/s²", 0.0, 1e4, "height")
+    kd_z: float = number(40.0, "1/s", 0.0, 1e3, "height rate")
+    ki_z: float = number(400.0, "1/s³", 0.0, 1e5, "height integrator")
+    kp_xy: float = number(0.0, "1/s²", 0.0, 1e4, "position, against the integrated speed")
+    kd_xy: float = number(20.0, "1/s", 0.0, 1e3, "velocity")
+    ki_xy: float = number(40.0, "1/s²", 0.0, 1e4, "velocity integrator")
+    # Yoked robots share one speed: without a leak their estimators' biases would wind the
+    # integrators up against each other.
+    leak_xy: float = number(6.0, "s", 0.01, 1e6, "time constant of its forgetting")
+    position_error_limit: float = number(0.05, "m", 0.0, 1.0, "of the position reference's lead")
+    kp_tilt: float = number(1000.0, "1/s²", 0.0, 1e4, "roll and pitch")
+    kd_tilt: float = number(60.0, "1/s", 0.0, 1e3, "roll and pitch rate")
+    kp_yaw: float = number(100.0, "1/s²", 0.0, 1e4, "yaw")
+    kd_yaw: float = number(20.0, "1/s", 0.0, 1e3, "yaw rate")
+    kp_swing: float = number(400.0, "1/s²", 0.0, 1e4, "swing foot")
+    kd_swing: float = number(40.0, "1/s", 0.0, 1e3, "swing foot rate")
+    contact_detection: bool = flag(True, "early touchdown becomes stance, a lost foot descends")
+    foot_load: str = choice(
+        ("fused", "sensor"),
+        "what feet bear. fused: by the joints' torques, and by foot sensors as far as they agree "
+        "with those; sensor: by foot sensors alone, which must measure N",
+    )
+    contact_force: float = number(4.0, "N", 0.5, 100.0, "load by a foot sensor that is contact")
+    contact_torque_force: float = number(12.0, "N", 0.5, 200.0, "load by torques that is contact")
+    reaction_filter_ms: float = number(
+        3.0, "ms", 0.5, 100.0, "time constant of both filters of the load by the joints' torques"
+    )
+    calibration_time: float = number(3.0, "s", 0.1, 1e4, "time constant of foot sensors' fit")
+    lost_contact_ms: int = number(5, "ms", 1, 100, "stance without force until it descends")
+    descent_speed: float = number(0.8, "m/s", 0.0, 3.0, "speed of a descending stance foot")
+    reject_side_contacts: bool = flag(
+        True, "a foot stopped from the side is no contact, nor an early one that bears no load"
+    )
+    liftoff_hold_ms: int = number(0, "ms", 0, 1000, "how long lift-off waits for contact")
+    reflex_ms: int = number(10, "ms", 0, 100, "a stopped swing foot rises until free for this")
+    reflex_lift: float = number(1.0, "m/s", 0.0, 3.0, "its upward speed")
+    track_sinking_trunk: bool = flag(
+        True, "a descending foot follows a sinking trunk; desired feet stay within reach"
+    )
+    flight: bool = flag(True, "without contact the desired motion of the trunk is free fall")
+    load_time: float = number(1.0, "s", 0.0, 100.0, "time constant of the external load; 0: none")
+    swing_delay: float = number(0.0, "1", 0.0, 0.5, "share of swing in which a foot only rises")
+    swing_acceleration: float = number(
+        100.0, "m/s²", 1.0, 1e4, "a late swing has a foothold so near that it needs no more"
+    )
+    ground_filter_ms: float = number(50.0, "ms", 0.0, 1e3, "filter of the ground height")
+    swing_height: float = number(0.09, "m", 0.01, 0.2, "apex above the higher foothold")
+    raibert_gain: float = number(0.03, "s", 0.0, 0.5, "foothold per velocity error")
+    foothold_inwards: float = number(
+        0.1, "m", 0.0, 10.0, "how far inwards of its hip a foothold may lie; times 1 + load / mass"
+    )
+    damping: float = number(2.0, "N·m·s/rad", 0.1, 10.0, "in mode damping, or while QPs fail")
+    fall_tilt: float = number(0.9, "rad", 0.3, 1.5, "a tilt beyond this is a fall: damping")
+    max_failures: int = number(20, "ms", 1, 1000, "failed QPs in a row before damping")
+
+
+@dataclass(frozen=True, slots=True)
+class PlannerConfig:
+    """The data-driven predictive planner."""
+
+    preset: str = choice(
+        ("usual", "fast", "paper"),
+        "usual: plans every 40 ms; fast: every 10 ms, for a network that is faster than that; "
+        "paper: as the paper writes it, with its Q and R",
+    )
+    kind: str = choice(
+        tuple(BUILT_IN),
+        "; ".join(f"{kind.name}: {kind.title}" for kind in BUILT_IN.values()),
+        more="the name of a plug-in's",
+    )
+    options: str = text("", "numbers of a plug-in's planner: name=number, with spaces between")
+    cost: str = choice(
+        ("own", "team"),
+        "distributed: what each agent minimises over its own forces. own: its own cost (eq. 12); "
+        "team: that of the whole team, with the new plan mixed with its last one: plans approach "
+        "a central planner's whatever the coupling",
+    )
+    compensation: bool = flag(True, "distributed: bring peers' plans forward by their age")
+    damping: float = number(
+        -1.0,
+        "1",
+        -1.0,
+        0.95,
+        "share of an agent's own last plan that its new one keeps. -1: none with up to three "
+        "robots (two with another preset than usual), else (n - 2)/(n + 2) with n; with the cost "
+        "'team' 0 and -1 are the share with which the plans converge fastest",
+    )
+    exchanges: int = number(0, "-", 0, 8, "distributed: best responses to plans of the same step")
+    latency_ms: int = number(8, "ms", 0, 100, "until a plan takes effect, ≤ 10·(N − applied)")
+    lambda_g: float = number(1e5, "1", 1e-9, 1e12, "deepc: weight of ‖g‖²")
+    lambda_sigma: float = number(1e5, "1", 1e-9, 1e15, "deepc: weight of ‖σ‖²")
+    interface: str = choice(
+        ("feedforward", "force"),
+        "feedforward: force deviations become accelerations of the pre-stabilised trunk; "
+        "force: planned forces and speeds are tracked by the whole-body QP (the paper)",
+    )
+    tracked: str = choice(
+        ("speeds", "outputs"),
+        "interface force: what the QP tracks of a plan. speeds: vx, vy; outputs: all (the paper)",
+    )
+    N: int = number(25, "samples", 4, 100, "control horizon")
+    T_ini: int = number(10, "samples", 2, 50, "estimation horizon")
+    applied: int = number(4, "samples", 1, 20, "samples applied before the next plan")
+    Q: Numbers = number(
+        (1e6, 1e5, 1e5, 2e5, 2e5, 2e3), "-", 0.0, inf, "weights of z, vx, vy, roll, pitch, wz"
+    )
+    R: Numbers = number((0.2, 0.2, 0.05), "-", 1e-9, inf, "weights of fx, fy, fz")
+    mu: float = number(0.6, "1", 0.05, 2.0, "friction coefficient of the planned forces")
+    force_min: float = number(0.0, "N", 0.0, 50.0, "least planned normal force")
+    deviation_max: Numbers = number(
+        (20.0, 20.0, 60.0), "N", 0.0, inf, "largest planned deviation from the nominal force"
+    )
+    output_bounds: str = choice(("none", "hard"), "planned outputs are bounded by output_max")
+    output_max: Numbers = number(
+        (0.03, 0.4, 0.3, 0.15, 0.15, 0.8),
+        "m, m/s, m/s, rad, rad, rad/s",
+        1e-6,
+        inf,
+        "largest planned deviation of z, vx, vy, roll, pitch, wz from what is commanded",
+    )
+    trust_range: Numbers = number(
+        (0.06, 0.5, 0.25, 2.0), "m, m/s, rad, rad/s", 1e-6, inf, "beyond it the plan fades out"
+    )
+    solver: str = choice(
+        ("daqp", "osqp"), "daqp: the closed form, Newton's method at limits of forces, else DAQP"
+    )
+    max_peer_age: int = number(3, "planning steps", 1, 25, "an older plan of a peer is not shifted")
+    hold_steps: int = number(5, "planning steps", 0, 250, "how long a lost peer's terms are held")
+    peer_timeout: float = number(5.0, "s wall", 0.01, 10.0, "lockstep: wait for a peer's plan")
+
+    @property
+    def option_values(self) -> Mapping[str, float]:
+        """What `options` sets, and the defaults of its kind for the rest, in the kind's order."""
+        return read_options(find_kind(self.kind), self.options)
+
+
+@dataclass(frozen=True, slots=True)
+class IdentificationConfig:
+    """Data collection and the predictor's fit and gates."""
+
+    preset: str = choice(("usual", "paper"), "paper: the pseudo-inverse, whatever its radius")
+    seconds: float = number(0.0, "s", 0.0, 3600.0, "of training data; 0: by the size of the team")
+    disturbed: float = number(0.25, "1", 0.0, 10.0, "share of this more, on boxes, under pushes")
+    held_out: float = number(8.0, "s", 2.0, 600.0, "world time held out of the fit")
+    episode: float = number(10.5, "s", 3.0, 600.0, "length of one episode")
+    noise: Numbers = number((3.0, 3.0, 5.0), "N", 0.0, inf, "std of forces, each foot for itself")
+    wrench_noise: Numbers = number(
+        (16.0, 16.0, 8.0, 14.0, 8.0),
+        "N",
+        0.0,
+        inf,
+        "force noise of a robot's feet together, of either sign, at each stance foot: along x, y, "
+        "z, vertical couple, horizontal couple",
+    )
+    noise_hold_ms: int = number(20, "ms", 10, 500, "how long one draw of noise is held")
+    vx: Numbers = number((-0.2, 0.7), "m/s", -2.0, inf, "range of random forward speeds")
+    vy: Numbers = number((-0.2, 0.2), "m/s", -2.0, inf, "range of random sideways speeds")
+    wz: Numbers = number((-0.3, 0.3), "rad/s", -2.0, inf, "range of random yaw rates")
+    hold: float = number(1.5, "s", 0.1, 60.0, "how long a random speed is held")
+    seed: int = number(1000, "-", 0, 2**31, "seed of the collection")
+    predictor: str = choice(
+        ("periodic", "ridge", "pinv"),
+        "the fit of G. periodic: a function of the gait's phase, in which no force acts on outputs "
+        "before it, with peers' forces by their net wrench; ridge: regularised, block-weighted; "
+        "pinv: the paper's",
+    )
+    response: str = text(
+        "",
+        "predictor 'periodic': file responses.npz of a probe, instead of data: only in simulation; "
+        "{robots} in it is how many there are",
+    )
+    neighbours: str = choice(
+        ("all", "yoked"), "yoked: robots that are not yoked to each other are taken as uncoupled"
+    )
+    ridge: float = number(1e-3, "1", 1e-12, 1e3, "ridge per data column")
+    block_weight: float = number(160.0, "1", 1.0, 1e4, "penalty weight w (as w²) of peers' columns")
+    order_per_robot: int = number(12, "states", 1, 100, "system order n = this · robots")
+    max_radius: float = number(1.0, "1", 0.01, 10.0, "gate: radius of the best-response map")
+    max_peers_harm: float = number(
+        0.02, "1", 0.0, 1000.0, "gate: share by which peers may raise an output's squared error"
+    )
+    gain_range: Numbers = number(
+        (0.3, 2.0), "1", -10.0, inf, "gate: height gain, predicted / physical"
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class ReferenceConfig:
+    """The reference of the operator once the team walks."""
+
+    vx: float = number(0.5, "m/s", -1.0, 1.2, "forward speed")
+    vy: float = number(0.0, "m/s", -0.5, 0.5, "leftward speed")
+    wz: float = number(0.0, "rad/s", -1.0, 1.0, "yaw rate")
+    height: float = number(0.26, "m", 0.2, 0.32, "trunk height above the ground")
+    ramp: float = number(1.0, "s", 0.0, 20.0, "time from standing to full speed")
+    trace: str = text(
+        "",
+        "CSV with columns t [s], vx, vy, wz that replaces these three, over and over: a path with "
+        "a '/', whose lines are stored here, separated by ';'; or a file beside the scenarios",
+    )
+    driver: str = choice(
+        (CONFIGURED, BY_HAND),
+        "who asks. configured: these keys; hand: whoever takes the controls, until then the team "
+        "stands, see docs/driving.md",
+    )
+    page_port: int = number(0, "-", 0, 65535, "hand: port of the page to drive from; 0: any free")
+    trace_shift: float = number(0.0, "s", 0.0, 3600.0, "the trace begins within this, seeded")
+
+
+@dataclass(frozen=True, slots=True)
+class RecorderConfig:
+    """The recording of all traffic."""
+
+    enabled: bool = flag(True, "the team waits for the recorder before it walks")
+    chunk_kib: int = number(256, "KiB", 16, 65536, "largest MCAP chunk; closed after 50 ms anyway")
+
+
+@dataclass(frozen=True, slots=True)
+class RuntimeConfig:
+    """How the operating system runs the processes."""
+
+    priority: str = choice(
+        ("realtime", "ordinary"),
+        "realtime: agents, planner and plants, in lockstep also the recorder, take precedence over "
+        "ordinary processes (SCHED_RR) if the user may do so; in realtime the recorder has nice "
+        "-15, and takes the same precedence once it gets too little; QUADRIGA_PRIORITY of the "
+        "environment overrides it",
+    )
+    check_cpu: bool = flag(
+        True,
+        "realtime: refuse to begin on a computer that the agents' ticks alone would keep busier "
+        "than it can be, as measured before",
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class BridgeConfig:
+    """How a bridge reaches its robot, and the limits that it keeps whatever an agent asks for."""
+
+    endpoint: str = text("", "A1, Go1: where the robot is, HOST:PORT; empty: 192.168.123.10:8007")
+    listen: str = text(
+        "", "A1, Go1: where its packets arrive, HOST:PORT; empty: port 8080 (A1) or 8090 (Go1)"
+    )
+    interface: str = text(
+        "", "Go2: its network interface, such as eth0; {number}: of the robot; lo: simulated ones"
+    )
+    domain: int = number(0, "1", 0, 200, "Go2: number of its DDS domain; on lo that of r1")
+    period_ms: int = number(
+        0, "ms", 0, 2, "between two states, and two commands; 0: 1 for A1 and Go1, 2 for Go2"
+    )
+    stop_buttons: str = text("L2+B", "buttons of the remote control that stop the robot")
+    torque_share: float = number(0.9, "1", 0.05, 1.0, "share of a motor's greatest torque")
+    torque_rate: float = number(8.0, "N·m/ms", 0.1, 100.0, "how fast that torque may change")
+    speed_share: float = number(0.95, "1", 0.1, 1.5, "share of a joint's greatest speed")
+    speed_ms: int = number(50, "ms", 0, 100, "how long a joint may be faster")
+    power_max: float = number(900.0, "W", 10.0, 5000.0, "mechanical power of all motors")
+    joint_margin: float = number(0.02, "rad", 0.0, 0.3, "distance kept from a joint's end stops")
+    tilt_max: float = number(0.9, "rad", 0.1, 3.2, "tilt of the trunk at which the robot stops")
+    battery_min: int = number(20, "%", 0, 100, "charge to stand up; at half it stops")
+    temperature_max: float = number(
+        0.0, "°C", 0.0, 120.0, "greatest of a motor to stand up; 8 °C more stop it; 0: the robot's"
+    )
+    report_share: float = number(
+        0.8, "1", 0.01, 1.0, "share of a second's packets that must come before it is commanded"
+    )
+    report_max_ms: int = number(70, "ms", 5, 1000, "age of its last packet at which it stops")
+    hold_ms: int = number(20, "ms", 2, 200, "age of a command from which on the joints are held")
+    damp_ms: int = number(70, "ms", 4, 1000, "age at which the robot stops; Linux stalls 54 ms")
+    passive_s: float = number(
+        3.0, "s", 0.1, 60.0, "how long a robot that stops is damped before its motors are off"
+    )
+    stand_kp: float = number(80.0, "N·m/rad", 1.0, 300.0, "stiffness while the bridge moves it")
+    stand_kd: float = number(4.0, "N·m·s/rad", 0.1, 20.0, "damping likewise")
+    stand_s: float = number(3.0, "s", 1.0, 30.0, "how long standing up takes, and lying down")
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
@@ -24,34 +24,25 @@ class TerrainKind:
     name: str
     builder: str
     text: str
-    _: KW_ONLY
     meaning: str = ""
     height_key: str = "terrain_height"
     least_height: float = 0.0
 
 
+_H: Final = "up to {terrain_height:g} m"
 _ROWS: Final = (
     TerrainKind("flat", "", "flat"),
-    TerrainKind("boxes", "ground:build_blocks", "boxes up to {terrain_height:g} m"),
-    TerrainKind(
-        "gravel", "ground:build_gravel", "gravel up to {terrain_height:g} m", meaning="fixed stones"
-    ),
-    TerrainKind(
-        "heightfield", "ground:build_smooth_field", "heightfield up to {terrain_height:g} m"
-    ),
+    TerrainKind("boxes", "ground:build_blocks", f"boxes {_H}"),
+    TerrainKind("gravel", "ground:build_gravel", f"gravel {_H}", "fixed stones"),
+    TerrainKind("heightfield", "ground:build_smooth_field", f"heightfield {_H}"),
     TerrainKind(
         "pebbles",
         "pebbles:build_pebbles",
-        "pebbles up to {terrain_height:g} m",
-        meaning="a layer of loose stones",
+        f"pebbles {_H}",
+        "a layer of loose stones",
         least_height=0.005,  # the ground holds millions of smaller stones
     ),
-    TerrainKind(
-        "slope",
-        "ground:build_ramps",
-        "slope of {slope:g} deg up to {terrain_height:g} m",
-        meaning="ramps up and down",
-    ),
+    TerrainKind("slope", "ground:build_ramps", "slope of {slope:g} deg " + _H, "ramps up and down"),
     TerrainKind(
         "stairs",
         "ground:build_stairs",

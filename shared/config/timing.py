@@ -4,17 +4,7 @@ from __future__ import annotations
 
 from quadriga.shared.config.sections import BRIDGED, Config
 from quadriga.shared.planner_kinds import find_kind
-from quadriga.shared.topics import (
-    COMMAND,
-    CONFIGURED,
-    PLAN,
-    SAMPLE_MS,
-    STATE,
-    STATUS,
-    STATUS_MS,
-    TABLE,
-    TRUTH,
-)
+from quadriga.shared.topics import COMMAND, PLAN, SAMPLE_MS, STATE, STATUS, STATUS_MS, TABLE, TRUTH
 
 
 def periods(config: Config) -> dict[str, int]:
@@ -28,23 +18,9 @@ def periods(config: Config) -> dict[str, int]:
         STATUS: STATUS_MS if config.world.mode == "lockstep" else 0,
         TRUTH: 1 if config.estimator.kind == "truth" else SAMPLE_MS,
     }
-    found = {
-        topic.name: configured[topic] if topic.period_ms == CONFIGURED else topic.period_ms
-        for topic in TABLE
-    }
     if config.team.plant == BRIDGED:
-        found |= dict.fromkeys((STATE.name, COMMAND.name), SAMPLE_MS)
-    return found
-
-
-def waits_for_router(config: Config) -> bool:
-    """Whether processes do without a router for `bus.reconnect_timeout` before they leave.
-
-    In lock-step a message that is lost would not be sent again. Where each robot has a plant of its
-    own, none goes on without the others.
-    """
-    realtime, alone = config.world.mode == "realtime", not config.team.plant_per_robot
-    return config.bus.mode == "client" and realtime and alone
+        configured |= {STATE: SAMPLE_MS, COMMAND: SAMPLE_MS}
+    return {topic.name: configured.get(topic, topic.period_ms) for topic in TABLE}
 
 
 def max_ages(config: Config) -> dict[str, int]:
@@ -56,8 +32,15 @@ def max_ages(config: Config) -> dict[str, int]:
     planner = config.planner
     late = max(1, planner.latency_ms) if find_kind(planner.kind).central else 0
     steps = 1 + planner.max_peer_age + planner.hold_steps
-    configured = {PLAN: steps * SAMPLE_MS * planner.applied + late}
-    return {
-        topic.name: configured[topic] if topic.max_age_ms == CONFIGURED else topic.max_age_ms
-        for topic in TABLE
-    }
+    ages = {topic.name: topic.max_age_ms for topic in TABLE}
+    return ages | {PLAN.name: steps * SAMPLE_MS * planner.applied + late}
+
+
+def waits_for_router(config: Config) -> bool:
+    """Whether processes do without a router for `bus.reconnect_timeout` before they leave.
+
+    In lock-step a message that is lost would not be sent again. Where each robot has a plant of its
+    own, none goes on without the others.
+    """
+    realtime, alone = config.world.mode == "realtime", not config.team.plant_per_robot
+    return config.bus.mode == "client" and realtime and alone

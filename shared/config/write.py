@@ -1,4 +1,4 @@
-"""`Config` → text: a commented TOML file, a table for the documentation, a hash."""
+"""`Config` → text: a TOML file, a table, a hash, and what a team's processes must agree on."""
 
 from __future__ import annotations
 
@@ -6,9 +6,20 @@ import hashlib
 import json
 from collections.abc import Container, Iterator, Mapping
 from dataclasses import asdict, fields
-from typing import Any
+from math import inf
+from typing import Any, Final
 
 from quadriga.shared.config.sections import Config
+
+# Sections that are a computer's own: where it is reached, how it runs programs, where it writes.
+_OWN_SECTIONS: Final = ("bus", "runtime", "recorder")
+# What of them the whole team rests on: who waits for whom, and for how long.
+_AGREED: Final = ("bus.clock_timeout", "recorder.enabled")
+# Single keys that are a computer's own: a label, names of files (what is in these is part of the
+# predictor), where a robot hangs.
+_OWN: Final = ("world.scenario", "identification.response")
+_OWN_OF_BRIDGES: Final = tuple(f"bridge.{k}" for k in ("endpoint", "listen", "interface", "domain"))
+_LONGEST: Final = 80  # characters of a value that is told in full
 
 
 def to_toml(config: Config, without: Container[str] = ()) -> str:
@@ -43,9 +54,8 @@ def to_markdown(config: Config) -> str:
         lines += ["", f"## `[{section.name}]`", "", _summary(values), ""]
         lines += ["| key | default | unit | permitted | meaning |", "|---|---|---|---|---|"]
         for item in fields(values):
-            meta = item.metadata
-            default = f"`{_toml(getattr(values, item.name))}`"
-            cells = [f"`{item.name}`", default, _unit(meta), _limits(meta), meta["doc"]]
+            meta, default = item.metadata, f"`{_toml(getattr(values, item.name))}`"
+            cells = (f"`{item.name}`", default, _unit(meta), _limits(meta), meta["doc"])
             lines.append(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |")
     return "\n".join(lines) + "\n"
 
@@ -61,11 +71,27 @@ def config_sha256(config: Config) -> str:
     return hashlib.sha256(canonical.encode()).hexdigest()
 
 
-def departures(config: Config, usual: Config) -> Iterator[tuple[str, Any, Any, Mapping[str, Any]]]:
-    """Keys whose values differ: `section.key`, value, the usual one, the key's metadata.
+def agreed_keys(config: Config) -> tuple[str, ...]:
+    """`section.key=value` of every key that all processes of a team must agree on, sorted.
 
-    How the processes reach each other (`bus`) changes nothing that they do and is left out.
+    Values are JSON; of one longer than 80 characters, such as a trace, a digest is told instead.
     """
+    found = list[str]()
+    for section, keys in asdict(config).items():
+        for key, value in keys.items():
+            name = f"{section}.{key}"
+            own = section in _OWN_SECTIONS or name in (*_OWN, *_OWN_OF_BRIDGES)
+            if own and name not in _AGREED:
+                continue
+            text = json.dumps(value)
+            if len(text) > _LONGEST:
+                text = f"sha256:{hashlib.sha256(text.encode()).hexdigest()[:16]}"
+            found.append(f"{name}={text}")
+    return tuple(sorted(found))
+
+
+def departures(config: Config, usual: Config) -> Iterator[tuple[str, Any, Any, Mapping[str, Any]]]:
+    """Keys whose values differ, but for `bus`: `section.key`, value, usual one, key's metadata."""
     for section in fields(config):
         mine, theirs = getattr(config, section.name), getattr(usual, section.name)
         for item in fields(mine):
@@ -78,25 +104,22 @@ def _summary(section: Any) -> str:
     return (section.__doc__ or "").strip().splitlines()[0]
 
 
-def _unit(meta: Any) -> str:
+def _unit(meta: Mapping[str, Any]) -> str:
     return "" if meta["unit"] in ("-", "1") else str(meta["unit"])
 
 
-def _limits(meta: Any) -> str:
+def _limits(meta: Mapping[str, Any]) -> str:
     if meta["choices"]:
         more = f", or {meta['more']}" if meta["more"] else ""
         return f"one of {', '.join(meta['choices'])}{more}"
     low, high = meta["low"], meta["high"]
-    if low is None:
-        return "" if high is None else f"≤ {high:g}"
-    return f"≥ {low:g}" if high is None else f"{low:.10g} … {high:.10g}"
+    if high < inf:
+        return f"{low:.10g} … {high:.10g}"
+    return f"≥ {low:g}" if low > -inf else ""
 
 
 def _toml(value: Any) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False)
     if isinstance(value, tuple):
         return f"[{', '.join(_toml(item) for item in value)}]"
-    return repr(value)
+    # JSON's texts and truth values are TOML's; its numbers are not, as 1e+16.
+    return json.dumps(value, ensure_ascii=False) if isinstance(value, (bool, str)) else repr(value)

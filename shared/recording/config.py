@@ -10,31 +10,28 @@ from typing import Final
 from quadriga.shared.config.load import build, flatten
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError, RecordingError
-from quadriga.shared.planner_kinds import stand_in
 from quadriga.shared.printable import printable_line
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.recording.recover import DamagedRecording
 from quadriga.shared.robots.registry import ROBOTS
 
-PLUGIN: Final = (
-    "planner"  # in the metadata: what is known of the planner's kind without its package
-)
+_OTHER_VERSION: Final = "recorded by another version of quadriga: use that one"
 
 
 def recorded_config(recording: Recording | DamagedRecording) -> Config:
     """The configuration of a recorded run.
 
-    A recording holds every key, so that no default of today stands for one of then. A planner, or a
-    robot, of a package that is not installed keeps its name: messages can be read without it, and
-    whatever needs more of it raises ConfigError (`Config.robot`, `planner_kinds.load_builder`).
+    A recording holds every key, so that no default of today stands for one of then. A robot of a
+    package that is not installed keeps its name: messages can be read without it, and whatever
+    needs more of it raises ConfigError (`Config.robot`).
 
     Raises:
         RecordingError: the recording holds none, or one with keys or values that this version
-            does not know.
+            does not know, such as a planner whose package is not installed.
     """
     found = recording.metadata
     try:
-        return _build(found.get("config_json", ""), found.get(PLUGIN, ""))
+        return _build(found.get("config_json", ""))
     except _NoConfigurationError:
         raise RecordingError(
             str(recording.path), "metadata without a configuration", "config_json in the metadata"
@@ -44,7 +41,7 @@ def recorded_config(recording: Recording | DamagedRecording) -> Config:
             f"configuration of {recording.path}",
             f"{error.name} = {error.got}",
             error.expected,
-            "recorded by another version of quadriga: use that one",
+            error.cause if error.name == "planner.kind" else _OTHER_VERSION,
         ) from None
     except RecursionError:  # in the words about a value that nests as deeply as JSON permits
         raise RecordingError(
@@ -60,7 +57,7 @@ class _NoConfigurationError(Exception):
 
 
 @lru_cache(maxsize=8)  # every reader of a recording asks, and a configuration does not change
-def _build(text: str, plugin: str) -> Config:
+def _build(text: str) -> Config:
     try:
         sections = json.loads(text)
     except (ValueError, RecursionError):  # the latter for what nests too deeply
@@ -71,9 +68,7 @@ def _build(text: str, plugin: str) -> Config:
     for name in flatten(asdict(Config())):
         if name not in keys:
             raise ConfigError(name, "no value", "a value of every key")
-    kind, team, robot = keys.get("planner.kind"), sections.get("team"), keys.get("team.robot")
-    if isinstance(kind, str) and kind.isprintable():
-        stand_in(kind, plugin, str(keys.get("planner.options", "")))
+    team, robot = sections.get("team"), keys.get("team.robot")
     if isinstance(team, dict) and isinstance(robot, str) and robot not in ROBOTS:
         config = build({**sections, "team": {k: v for k, v in team.items() if k != "robot"}})
         return replace(config, team=replace(config.team, robot=printable_line(robot)))

@@ -4,19 +4,12 @@ from __future__ import annotations
 
 from typing import Final
 
-# Any two can be told apart by the colour-blind too; those of small teams best. None is the gold of
-# the yokes or the magenta of what is planned.
+# Blue, orange, violet, wine, salmon, teal, lilac, red, pink, indigo. Any two can be told apart by
+# the colour-blind too; those of small teams best. None is the gold of the yokes or the magenta of
+# what is planned.
 _COLOURS: Final = (
-    "#0078b4",  # blue
-    "#e15a00",  # orange
-    "#960fff",  # violet
-    "#872d4b",  # wine
-    "#e19687",  # salmon
-    "#0fb4c3",  # teal
-    "#d278ff",  # lilac
-    "#a5000f",  # red
-    "#d25a87",  # pink
-    "#4b3cb4",  # indigo
+    *("#0078b4", "#e15a00", "#960fff", "#872d4b", "#e19687"),
+    *("#0fb4c3", "#d278ff", "#a5000f", "#d25a87", "#4b3cb4"),
 )
 N_ROBOT_COLOURS: Final = len(_COLOURS)  # larger teams begin anew
 

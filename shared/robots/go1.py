@@ -7,9 +7,10 @@ the speed limit and of the peak.
 Continuous torque: the same share of the peak as the A1's. Temperature: these motors protect
 themselves at 90 °C (unitree_actuator_sdk, GO-M8010-6); a bridge stops them 2 °C before.
 
-Foot sensors: measured on a walking Go1, 130 foot-seconds: 11.4 to 13.3 counts per N, 100 to 160
-counts without load, noise of 0.5 to 0.75 counts, at most 3 to 7 counts of drift in 21 s, new counts
-49 times a second. Assumed: dropouts, of which there were none, and the accelerometer, the Go2's.
+Foot sensors are the configuration's defaults, measured on a walking Go1, 130 foot-seconds: 11.4 to
+13.3 counts per N, 100 to 160 counts without load, noise of 0.5 to 0.75 counts, at most 3 to 7
+counts of drift in 21 s, new counts 49 times a second. Assumed: dropouts, of which there were none,
+and the accelerometer, the Go2's.
 """
 
 from __future__ import annotations
@@ -40,15 +41,5 @@ GO1: Final = RobotSpec(
     upper=4 * (0.863, 4.501, -0.888),
     stand_height=0.28,
     reach=0.38,
-    defaults={
-        "reference.height": 0.28,
-        "sensors.foot_scale": 12.5,
-        "sensors.foot_scale_spread": 0.06,
-        "sensors.foot_offset": 120.0,
-        "sensors.foot_bias": 30.0,
-        "sensors.foot_drift": 1.5,
-        "sensors.foot_force": 0.05,
-        "sensors.foot_refresh_rate": 49.0,
-        "sensors.accel_bias": 0.15,
-    },
+    defaults={"reference.height": 0.28},
 )

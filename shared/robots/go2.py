@@ -43,12 +43,8 @@ GO2: Final = RobotSpec(
     defaults={
         "reference.height": 0.28,
         "sensors.foot_scale": 0.65,
-        "sensors.foot_scale_spread": 0.06,
         "sensors.foot_offset": 15.0,
         "sensors.foot_bias": 1.6,
         "sensors.foot_drift": 0.08,
-        "sensors.foot_force": 0.05,
-        "sensors.foot_refresh_rate": 49.0,
-        "sensors.accel_bias": 0.15,
     },
 )

@@ -155,9 +155,7 @@ class RobotSpec:
         for path, attributes in self.urdf_changes.items():
             element = root.find(path)
             if element is None:
-                raise ConfigError(
-                    self.urdf, f"no {path}", f"the URDF that the {self.title} is known from"
-                )
+                raise ConfigError(self.urdf, f"no {path}", f"the URDF of the {self.title}")
             element.attrib.update(attributes)
         return root
 
@@ -168,17 +166,12 @@ class RobotSpec:
             ConfigError: the package is not installed in this environment.
         """
         found = importlib.util.find_spec("cmeel")
-        roots = [] if found is None or found.origin is None else [Path(found.origin).parent.parent]
-        for root in roots:
-            path = root / _PACKAGE / self.urdf
-            if path.is_file():
-                return path
-        raise ConfigError(
-            f"description of the robot {self.title}",
-            f"no {Path(self.urdf).name}",
-            "the file of the package example-robot-data",
-            "install the project's dependencies with `make install`",
-        )
+        site = Path(found.origin).parent.parent if found and found.origin else Path()
+        path = site / _PACKAGE / self.urdf
+        if path.is_file():
+            return path
+        name, cause = f"description of the robot {self.title}", "`make install` installs it"
+        raise ConfigError(name, f"no {path.name}", "the package example-robot-data", cause)
 
 
 def _read_only(array: Array) -> Array:

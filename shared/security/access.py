@@ -12,7 +12,7 @@ up comes at once. With ten times the rate of states up to one in 300 was dropped
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from math import prod
 from typing import Any, Final
@@ -38,10 +38,9 @@ _OF_LEAD: Final = (CLOCK, TRUTH)  # only who drives time knows
 _SPARE_SESSIONS: Final = 8  # for those who look on, and who has yet to be found dead
 # Greatest length of what has no fixed one, by its letter: samples, robots, yokes, plans, ticks.
 _LENGTHS: Final = {"N": 100, "n": 10, "k": 45, "P": 1000, "K": 10_000}
-_LISTED: Final = 16_384  # bytes of a list or a map
-_TEXT: Final = 4 * MAX_TEXT  # bytes
-_NUMBER: Final = 9  # bytes
-_FRAME: Final = 32  # bytes beside the content of a field, its name aside
+# Bytes of a field's content, and of what stands beside it, its name aside.
+_SIZES: Final = {bool: 1, int: 9, float: 9, str: 4 * MAX_TEXT, list: 16_384, dict: 16_384}
+_FRAME: Final = 32
 _ANSWER: Final = 256  # bytes of a question whether all has arrived, and of the answer
 
 
@@ -99,81 +98,24 @@ def identity_of(process: str) -> str:
 def team_rights(config: Config) -> tuple[Rights, ...]:
     """The rights of everybody who may be on a team's bus but the router, which enforces them."""
     team, robots = config.team.name, robot_names(config.team.robots)
-    return tuple(
-        Rights(who, _published(who, team, robots), _heard(who, team))
-        for who in team_identities(config)
-        if who.role != ROUTER
-    )
+    found = list[Rights]()
+    for who in team_identities(config):
+        if who.role in _HEARERS:
+            found.append(Rights(who, (), (f"{team}/**",)))
+        elif who.role != ROUTER:
+            sent = [topic for topic in TABLE if topic is ESTOP or who.role in topic.senders]
+            heard = [topic for topic in TABLE if who.role in topic.receivers]
+            found.append(
+                Rights(
+                    who,
+                    tuple(t.key(team, name) for t in sent for name in _names(who, t, robots)),
+                    tuple(t.key(team, _heard_of(who, t)) for t in heard),
+                )
+            )
+    return tuple(found)
 
 
-def router_rules(config: Config) -> dict[str, Any]:
-    """Zenoh's settings of a team's router: who may send and hear what, and how much."""
-    return {"access_control": access_control(config), **capacity(config)}
-
-
-def access_control(config: Config) -> dict[str, Any]:
-    """Zenoh's `access_control`: everything denied but what the team's rights permit."""
-    team = config.team.name
-    common = _common_rules(team)
-    rules, subjects, policies = [*common], list[dict[str, Any]](), list[dict[str, Any]]()
-    for rights in team_rights(config):
-        name, own = rights.identity.name, _own_rules(rights, team)
-        rules += own
-        subjects.append({"id": name, "cert_common_names": [name]})
-        policies.append({"rules": [rule["id"] for rule in (*common, *own)], "subjects": [name]})
-    return {
-        "enabled": True,  # without it the whole block is silently nothing
-        "default_permission": "deny",
-        "rules": rules,
-        "subjects": subjects,
-        "policies": policies,
-    }
-
-
-def capacity(config: Config) -> dict[str, Any]:
-    """Zenoh's settings of a router that let nobody take more than its share."""
-    team = config.team.name
-    sizes = [_size(t.name, ["put"], t.key(team, "*"), largest(t.type)) for t in TABLE]
-    sizes.append(_size("receipts", ["query", "reply"], f"{team}/*/{RECEIVED}", _ANSWER))
-    sizes += [
-        _size(q.name, ["query", "reply"], q.key(team, "*"), largest(q.type)) for q in QUESTIONS
-    ]
-    return {
-        "low_pass_filter": sizes,
-        "transport/unicast/max_sessions": len(team_identities(config)) + _SPARE_SESSIONS,
-        "transport/unicast/max_links": 1,  # the rules do not see a second link of a session
-        "transport/link/rx/max_message_size": MAX_BYTES,
-    }
-
-
-def largest(kind: type[Message]) -> int:
-    """Bytes that a message of a type takes at most."""
-    sizes = {bool: 1, int: _NUMBER, float: _NUMBER, str: _TEXT, list: _LISTED, dict: _LISTED}
-    total = _FRAME
-    for item in fields(kind):
-        meta = item.metadata
-        size = _array(meta["shape"]) if "shape" in meta else sizes[meta["kind"]]
-        total += len(item.name) + _FRAME + size
-    return min(total, MAX_BYTES)
-
-
-def questions_of(team: str) -> list[str]:
-    """What anybody may ask a process: whether all has arrived, and who it is."""
-    return [f"{team}/*/{RECEIVED}", *(question.key(team, "*") for question in QUESTIONS)]
-
-
-def _published(who: Identity, team: str, robots: Sequence[str]) -> tuple[str, ...]:
-    if who.role in _HEARERS:
-        return ()
-    return tuple(
-        topic.key(team, name)
-        for topic in TABLE
-        if topic is ESTOP or who.role in topic.senders
-        for name in _names_in_keys(who, topic, robots)
-    )
-
-
-def _names_in_keys(who: Identity, topic: Topic, robots: Sequence[str]) -> Iterable[str]:
+def _names(who: Identity, topic: Topic, robots: Sequence[str]) -> Sequence[str]:
     """The robots for whom a sender of a topic may speak; [""] of a topic that is for all."""
     if topic in _OF_LEAD and who.name not in LEADS:
         return ()
@@ -184,37 +126,46 @@ def _names_in_keys(who: Identity, topic: Topic, robots: Sequence[str]) -> Iterab
     return (who.robot,) if who.robot else robots
 
 
-def _heard(who: Identity, team: str) -> tuple[str, ...]:
-    if who.role in _HEARERS:
-        return (f"{team}/**",)
-    return tuple(
-        topic.key(team, who.robot if topic is STATE and who.role == AGENT else "*")
-        for topic in TABLE
-        if who.role in topic.receivers
-    )
+def _heard_of(who: Identity, topic: Topic) -> str:
+    return who.robot if topic is STATE and who.role == AGENT else "*"
 
 
-def _common_rules(team: str) -> list[dict[str, Any]]:
-    """What everybody with a valid certificate may do: see who is there, and ask how it is."""
+def router_rules(config: Config) -> dict[str, Any]:
+    """Zenoh's settings of a team's router: who may send and hear what, and how much."""
+    return {"access_control": access_control(config), **capacity(config)}
+
+
+def access_control(config: Config) -> dict[str, Any]:
+    """Zenoh's `access_control`: everything denied but what the team's rights permit."""
+    team = config.team.name
     tokens = [f"{team}/*/*/*"]
-    return [
+    # What everybody with a valid certificate may do: see who is there, and ask how it is.
+    common = [
         _rule("tokens-seen", ["liveliness_token"], _OUT, tokens),
         _rule("tokens-asked", ["liveliness_query", "declare_liveliness_subscriber"], _BOTH, tokens),
         # A publisher sends nothing before it knows that somebody listens.
         _rule("listeners-seen", ["declare_subscriber"], _OUT, [f"{team}/**"]),
         _rule("questions", ["declare_queryable", "query", "reply"], _BOTH, questions_of(team)),
     ]
-
-
-def _own_rules(rights: Rights, team: str) -> list[dict[str, Any]]:
-    name = rights.identity.name
-    rules = [_rule(f"{name}-token", ["liveliness_token"], _IN, [f"{team}/{name}/*/*"])]
-    if rights.publishes:
-        rules.append(_rule(f"{name}-publishes", ["put"], _IN, rights.publishes))
-    if rights.hears:
-        rules.append(_rule(f"{name}-subscribes", ["declare_subscriber"], _IN, rights.hears))
-        rules.append(_rule(f"{name}-hears", ["put"], _OUT, rights.hears))
-    return rules
+    rules, subjects, policies = [*common], list[dict[str, Any]](), list[dict[str, Any]]()
+    for rights in team_rights(config):
+        name = rights.identity.name
+        own = [_rule(f"{name}-token", ["liveliness_token"], _IN, [f"{team}/{name}/*/*"])]
+        if rights.publishes:
+            own.append(_rule(f"{name}-publishes", ["put"], _IN, rights.publishes))
+        if rights.hears:
+            own.append(_rule(f"{name}-subscribes", ["declare_subscriber"], _IN, rights.hears))
+            own.append(_rule(f"{name}-hears", ["put"], _OUT, rights.hears))
+        rules += own
+        subjects.append({"id": name, "cert_common_names": [name]})
+        policies.append({"rules": [rule["id"] for rule in (*common, *own)], "subjects": [name]})
+    return {
+        "enabled": True,  # without it the whole block is silently nothing
+        "default_permission": "deny",
+        "rules": rules,
+        "subjects": subjects,
+        "policies": policies,
+    }
 
 
 def _rule(
@@ -230,12 +181,38 @@ def _rule(
     }
 
 
-def _size(name: str, messages: list[str], key: str, limit: int) -> dict[str, Any]:
-    """Rule of the greatest size of messages that come in, bytes."""
-    rule = {"id": name, "messages": messages, "flows": _IN, "key_exprs": [key]}
-    return {**rule, "size_limit": limit}
+def capacity(config: Config) -> dict[str, Any]:
+    """Zenoh's settings of a router that let nobody take more than its share."""
+    team, asked = config.team.name, ["query", "reply"]
+    limits = [
+        *((t.name, ["put"], t.key(team, "*"), largest(t.type)) for t in TABLE),
+        ("receipts", asked, f"{team}/*/{RECEIVED}", _ANSWER),
+        *((q.name, asked, q.key(team, "*"), largest(q.type)) for q in QUESTIONS),
+    ]
+    return {
+        "low_pass_filter": [
+            {"id": name, "messages": of, "flows": _IN, "key_exprs": [key], "size_limit": limit}
+            for name, of, key, limit in limits
+        ],
+        "transport/unicast/max_sessions": len(team_identities(config)) + _SPARE_SESSIONS,
+        "transport/unicast/max_links": 1,  # the rules do not see a second link of a session
+        "transport/link/rx/max_message_size": MAX_BYTES,
+    }
 
 
-def _array(shape: Iterable[int | str]) -> int:
-    """Bytes of float64 of a shape; of a length that nobody knows as many as a message may have."""
-    return 8 * prod(d if isinstance(d, int) else _LENGTHS.get(d, MAX_BYTES) for d in shape)
+def largest(kind: type[Message]) -> int:
+    """Bytes that a message of a type takes at most."""
+    total = _FRAME
+    for item in fields(kind):
+        shape = item.metadata.get("shape")
+        if shape is None:
+            size = _SIZES[item.metadata["kind"]]
+        else:  # of a length that nobody knows as many as a message may have
+            size = 8 * prod(d if isinstance(d, int) else _LENGTHS.get(d, MAX_BYTES) for d in shape)
+        total += len(item.name) + _FRAME + size
+    return min(total, MAX_BYTES)
+
+
+def questions_of(team: str) -> list[str]:
+    """What anybody may ask a process: whether all has arrived, and who it is."""
+    return [f"{team}/*/{RECEIVED}", *(question.key(team, "*") for question in QUESTIONS)]

@@ -9,8 +9,7 @@ Imported only where there are certificates: `cryptography` takes 0.1 s.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -79,11 +78,15 @@ def read_certificate(path: Path) -> Certificate:
     """
     found = _load(path)
     try:
-        with _without_warnings():
+        with warnings.catch_warnings(action="ignore"):  # what is unusual can be read all the same
             names = found.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
-            hosts = _hosts_of(found)
+            extensions = found.extensions
+        alternative = extensions.get_extension_for_class(x509.SubjectAlternativeName).value
+        hosts = tuple(str(name.value) for name in alternative)
+    except x509.ExtensionNotFound:
+        hosts = ()
     except UNREADABLE as error:
-        raise _damaged(path, str(error)) from None
+        raise _damaged(path, error) from None
     name = str(names[0].value) if names else ""
     return Certificate(name, hosts, found.not_valid_before_utc, found.not_valid_after_utc)
 
@@ -107,7 +110,7 @@ def load_certificate(text: bytes) -> x509.Certificate:
     Raises:
         one of UNREADABLE: it is none.
     """
-    with _without_warnings():
+    with warnings.catch_warnings(action="ignore"):
         return x509.load_pem_x509_certificate(text)
 
 
@@ -117,34 +120,12 @@ def _load(path: Path) -> x509.Certificate:
     try:
         return load_certificate(text)
     except UNREADABLE as error:
-        raise _damaged(path, describe_pem_error(text, error)) from None
+        raise _damaged(path, error) from None
 
 
-@contextmanager
-def _without_warnings() -> Iterator[None]:
-    """Say nothing of what is unusual in a certificate that can be read all the same."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        yield
-
-
-def describe_pem_error(text: bytes, error: Exception) -> str:
-    """What is wrong with a PEM file; the library's words are about itself where there is no PEM."""
-    if b"-----BEGIN " in text:
-        return str(error)
-    return "text that is not PEM" if text.strip() else "an empty file"
-
-
-def _damaged(path: Path, got: str) -> ConfigError:
-    return ConfigError(str(path), got[:200], "a certificate", "damaged? `quadriga certs renew`")
-
-
-def _hosts_of(found: x509.Certificate) -> tuple[str, ...]:
-    try:
-        names = found.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
-    except x509.ExtensionNotFound:
-        return ()
-    return tuple(str(name.value) for name in names)
+def _damaged(path: Path, error: Exception) -> ConfigError:
+    cause = "damaged? `quadriga certs renew`"
+    return ConfigError(str(path), str(error)[:200], "a certificate", cause)
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,19 +161,17 @@ def tls_files(certificates: str, process: str) -> TlsFiles:
     """
     identity = identity_of(process)
     files = TlsFiles.within(Path(certificates).absolute() / identity)
-    copy = f"copy the folder {identity} to this machine"
+    copy = f"`quadriga certs make` makes it; copy the folder {identity} to this machine"
     for path in (files.authority, files.certificate, files.key):
         if not path.is_file() or not path.stat().st_size:
-            got = "an empty file" if path.is_file() else "no such file"
-            cause = f"`quadriga certs make` makes it; {copy}"
-            raise ConfigError(str(path), got, f"the certificates of {identity}", cause)
+            raise ConfigError(str(path), "no file, or an empty one", f"that of {identity}", copy)
     if files.key.stat().st_mode & OTHERS:
         mode = f"mode {files.key.stat().st_mode & 0o777:o}"
         raise ConfigError(str(files.key), mode, "600", "others may read this private key")
     name = read_certificate(files.certificate).name
     if name != identity:  # the router would silently deny what it says
-        got, cause = f"the certificate of {name!r}", f"copied under another name? {copy}"
-        raise ConfigError(str(files.certificate), got, f"that of {identity}", cause)
+        got = f"the certificate of {name!r}"
+        raise ConfigError(str(files.certificate), got, f"that of {identity}", copy)
     return files
 
 

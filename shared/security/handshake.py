@@ -12,8 +12,7 @@ from typing import Final
 
 from quadriga.shared.config.endpoints import host_and_port
 from quadriga.shared.errors import ConfigError, system_reason
-from quadriga.shared.runtime.clock import utc_now
-from quadriga.shared.security.certificates import EXPIRED, NOT_YET_VALID, TlsFiles, read_certificate
+from quadriga.shared.security.certificates import EXPIRED, NOT_YET_VALID, TlsFiles
 
 TRUSTED: Final = "trusted"
 UNREACHABLE: Final = "unreachable"  # nobody answers there
@@ -21,9 +20,8 @@ UNTRUSTED: Final = "untrusted"  # its certificate is of another authority, or fo
 REFUSED: Final = "refused"  # it does not accept ours
 
 _TIMEOUT: Final = 2.0  # s, for the connection and for each answer
-# s, in which a listener that does not accept our certificate says so: it does that afterwards.
+# s, in which a listener that does not accept our certificate says so, after the handshake.
 _VERDICT: Final = 0.3
-_LOOK: Final = 0.02  # s
 _DATES: Final = {9: NOT_YET_VALID, 10: EXPIRED}  # OpenSSL's codes
 CAUSES: Final = {
     UNREACHABLE: "is the router there (`quadriga router`), and does the name resolve?",
@@ -31,7 +29,7 @@ CAUSES: Final = {
     NOT_YET_VALID: "a clock that is wrong, here or where it was made",
     UNTRUSTED: "another authority's, or the router was not made for this address: "
     "`quadriga certs make --router HOST`",
-    REFUSED: "our certificate has expired or is another authority's: `quadriga certs show`",
+    REFUSED: "ours has expired, is not yet valid or another authority's: `quadriga certs show`",
 }
 
 
@@ -54,12 +52,7 @@ def shake_hands(endpoint: str, files: TlsFiles) -> Handshake:
         ConfigError: the endpoint is malformed, or the files cannot be used.
     """
     host, port = host_and_port(endpoint)
-    context, now = _context(files), utc_now()
-    held = read_certificate(files.certificate)
-    if held.state(now) == NOT_YET_VALID:  # the other side would say that it has expired
-        return Handshake(
-            NOT_YET_VALID, f"ours is valid from {held.begins:%F %T}, now is {now:%F %T}"
-        )
+    context = _context(files)
     try:
         with (
             socket.create_connection((host, port), _TIMEOUT) as link,
@@ -76,32 +69,21 @@ def shake_hands(endpoint: str, files: TlsFiles) -> Handshake:
         return Handshake(UNREACHABLE, system_reason(error))
 
 
+def _await_verdict(secured: ssl.SSLSocket) -> Handshake:
+    """What the listener says of our certificate once it has seen it; silence is consent."""
+    secured.settimeout(_VERDICT)
+    try:
+        return Handshake(TRUSTED) if secured.recv(1) else Handshake(REFUSED, "it hung up")
+    except TimeoutError:
+        return Handshake(TRUSTED)
+
+
 def _context(files: TlsFiles) -> ssl.SSLContext:
-    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
-    context.minimum_version = ssl.TLSVersion.TLSv1_2
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)  # TLS 1.2 at least
     try:
         context.load_verify_locations(files.authority)
         context.load_cert_chain(files.certificate, files.key)
     except OSError as error:  # of ssl's own kind too
-        raise ConfigError(
-            str(files.certificate.parent),
-            system_reason(error),
-            "a certificate, its key and the authority's certificate",
-            "`quadriga certs show`",
-        ) from None
+        folder, expected = str(files.certificate.parent), "a certificate, its key, the authority's"
+        raise ConfigError(folder, system_reason(error), expected, "`quadriga certs show`") from None
     return context
-
-
-def _await_verdict(secured: ssl.SSLSocket) -> Handshake:
-    """What the listener says of our certificate once it has seen it; silence is consent."""
-    secured.settimeout(_LOOK)
-    for _ in range(round(_VERDICT / _LOOK)):
-        try:
-            if not secured.recv(1):
-                return Handshake(REFUSED, "it hung up")
-        except TimeoutError:
-            session = secured.session
-            if session is None or not session.has_ticket:
-                continue
-        break
-    return Handshake(TRUSTED)

@@ -11,7 +11,7 @@ from websockets.datastructures import Headers
 LOOPBACK: Final = frozenset({"127.0.0.1", "localhost"})
 # Who may show a page within its own: the page to drive from frames a view, strangers none.
 FRAMED_BY: Final = "frame-ancestors 'self' http://127.0.0.1:* http://localhost:*"
-# Where a page's server says what went wrong with a request, such as a browser's connection that it
+# Where a page's server says what went wrong with a request, such as a connection that a browser
 # opened in advance and never used: nowhere. A reader of the terminal would get a traceback.
 UNHEARD: Final = logging.Logger("unheard")  # known to nobody who configures loggers
 UNHEARD.addHandler(logging.NullHandler())

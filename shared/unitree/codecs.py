@@ -9,12 +9,10 @@ CDR without the structs' padding, and the DDS library turns one into the other.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Mapping, Sequence
-from itertools import pairwise
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from quadriga.shared.robots.conventions import N_JOINTS
 from quadriga.shared.unitree.packets import (
@@ -30,12 +28,12 @@ from quadriga.shared.unitree.packets import (
     RobotReport,
 )
 
-Raw = NDArray[np.uint8]
 _Fields = Sequence[tuple[Any, ...]]
 
 _MOTORS: Final = 20  # of which the robots have twelve
 _LOW_LEVEL: Final = 0xFF
-_HEAD: Final = b"\xfe\xef"
+_HEAD: Final = (0xFE, 0xEF)
+_COMMANDED: Final = ("q", "dq", "tau", "kp", "kd")
 _STEPS: Final = np.iinfo(np.int16)
 _GREATEST: Final = float(np.finfo(np.float32).max)
 _CELLS: Final = 10
@@ -66,66 +64,6 @@ def seal(packet: bytes) -> bytes:
     return packet[:-4] + crc32(packet[:covered]).to_bytes(4, "little")
 
 
-class Fields:
-    """Numbers of one type that lie scattered over a packet, read and written at once.
-
-    numpy takes a microsecond for each field of a struct, and a packet has dozens. The bytes of all
-    numbers of a type are gathered instead, by places that are worked out once.
-
-    Args:
-        layout: of the packet.
-        members: what to read, each by its path, such as `motor__q`, with the order in which its
-            numbers are wanted: places in the packet's own order. None: as they are.
-
-    Raises:
-        ValueError: they are not of one type.
-    """
-
-    def __init__(self, layout: np.dtype[Any], **members: NDArray[np.int64] | None) -> None:
-        parts, kinds = list[NDArray[np.int64]](), set[np.dtype[Any]]()
-        for path, order in members.items():
-            places, kind = _places(layout, path.split("__"))
-            kinds.add(kind)
-            places = places if order is None else places[order]
-            parts.append((places[:, None] + np.arange(kind.itemsize)).ravel())
-        if len(kinds) != 1:
-            raise ValueError(f"{', '.join(members)}: of several types")
-        self.kind = kinds.pop()
-        self._places = np.concatenate(parts)
-        ends = np.cumsum([0, *(len(part) // self.kind.itemsize for part in parts)]).tolist()
-        self._cuts = [slice(*ends_of) for ends_of in pairwise(ends)]
-
-    def read(self, raw: Raw, kind: type[Any]) -> list[NDArray[Any]]:
-        """The numbers of each member, as another type.
-
-        Args:
-            raw: the packet's bytes.
-            kind: of the numbers that are given.
-        """
-        numbers = raw[self._places].view(self.kind).astype(kind)
-        return [numbers[cut] for cut in self._cuts]
-
-    def write(self, raw: Raw, *values: NDArray[Any]) -> None:
-        """Put numbers of each member into a packet; they must fit."""
-        numbers = np.concatenate(values).astype(self.kind)
-        raw[self._places] = numbers.view(np.uint8)
-
-
-def _places(layout: np.dtype[Any], path: Sequence[str]) -> tuple[NDArray[np.int64], np.dtype[Any]]:
-    """Where the numbers of a member begin in a packet, and their type."""
-    begins, kind = np.zeros(1, dtype=np.int64), layout
-    for name in path:
-        if kind.fields is None:
-            raise ValueError(f"{name}: not a struct")
-        kind, offset = kind.fields[name][:2]
-        begins = begins + offset
-        if kind.subdtype is not None:
-            kind, shape = kind.subdtype
-            within = kind.itemsize * np.arange(int(np.prod(shape)))
-            begins = (begins[:, None] + within).ravel()
-    return begins, kind
-
-
 class Codec:
     """Turns packets of one kind of robot into bytes and back; the robot's side and ours.
 
@@ -146,36 +84,25 @@ class Codec:
         command: np.dtype[np.void],
         report: np.dtype[np.void],
         servo: int,
-        scale: Mapping[str, float] | None = None,
+        scale: tuple[float, float, float] | None = None,
     ) -> None:
         self.command, self.report, self.servo = command, report, servo
-        self._name, joints = name, JOINT_PLACES
-        scale = scale or {"tau": 1.0, "kp": 1.0, "kd": 1.0}
-        self._tau_scale = scale["tau"]
-        self._scales = np.repeat([scale["tau"], scale["kp"], scale["kd"]], N_JOINTS)
-        self._angles = Fields(command, motor__q=joints, motor__dq=joints)
-        self._efforts = Fields(command, motor__tau=joints, motor__kp=joints, motor__kd=joints)
-        self._asked_modes = Fields(command, motor__mode=joints)
-        self._floats = Fields(
-            report,
-            imu__quaternion=None,
-            imu__gyro=None,
-            imu__accel=None,
-            motor__q=joints,
-            motor__dq=joints,
-        )
-        self._torques = Fields(report, motor__tau=joints)
-        self._feet = Fields(report, foot=FOOT_PLACES)
-        self._modes = Fields(report, motor__mode=joints)
-        self._temperatures = Fields(report, motor__temperature=joints, imu__temperature=None)
-        counts_lost = "lost" in (report["motor"].base.names or ())
-        self._lost = Fields(report, motor__lost=joints) if counts_lost else None
-        self._blank_command, self._blank_report = self._blank(command), self._blank(report)
-        self._blank_command["level"] = _LOW_LEVEL
-        motors = self._blank_command["motor"]
+        self._name, self._in_steps = name, scale is not None
+        self._scale = np.array(scale or (1.0, 1.0, 1.0))[:, None]
+        names = report.names or ()
+        self._has_battery = "battery" in names
+        self._tells_power = "power_v" in names  # as a field, and not as the sum of the cells'
+        self._counts_lost = "lost" in (report["motor"].base.names or ())
+        asked, told = np.zeros(1, command), np.zeros(1, report)
+        for blank in (asked, told):
+            if "head" in names:
+                blank["head"] = _HEAD
+            blank["level"] = _LOW_LEVEL
+        if self._tells_power:  # a Go2 leaves the level of its reports 0
+            told["level"] = 0
+        motors = asked["motor"]
         motors["mode"], motors["q"], motors["dq"] = servo, NO_ANGLE, NO_RATE  # of those it lacks
-        if not self._tells_power:  # a Go2 leaves the level of its reports 0
-            self._blank_report["level"] = _LOW_LEVEL
+        self._blank_command, self._blank_report = asked.tobytes(), told.tobytes()
 
     def encode_command(self, targets: MotorTargets) -> bytes:
         """The bytes that a robot obeys.
@@ -187,20 +114,20 @@ class Codec:
             PacketError: a number is not finite.
         """
         t = targets
-        # This way round, no number is refused, too.
-        if not (np.abs(np.concatenate((t.q, t.dq, t.tau, t.kp, t.kd))) <= _GREATEST).all():
-            for name in ("q", "dq", "tau", "kp", "kd"):
-                if not (np.abs(values := getattr(t, name)) <= _GREATEST).all():
-                    expected = "finite numbers of 32 bits"
-                    raise PacketError(f"motor command: {name}", f"{values}", expected)
-        raw = np.frombuffer(self._blank_command.tobytes(), np.uint8).copy()
-        self._asked_modes.write(raw, t.mode)
-        self._angles.write(raw, t.q, t.dq)
-        efforts = self._scales * np.concatenate((t.tau, t.kp, t.kd))
-        if self._efforts.kind.kind == "i":
-            efforts = np.trunc(np.clip(efforts, _STEPS.min, _STEPS.max))
-        self._efforts.write(raw, efforts)
-        return seal(raw.tobytes())
+        numbers = np.stack((t.q, t.dq, t.tau, t.kp, t.kd))
+        wrong = ~(np.abs(numbers) <= _GREATEST).all(axis=1)  # this way round, no number is, too
+        if wrong.any():
+            k = int(wrong.argmax())
+            expected = "finite numbers of 32 bits"
+            raise PacketError(f"motor command: {_COMMANDED[k]}", f"{numbers[k]}", expected)
+        if self._in_steps:
+            numbers[2:] = np.trunc(np.clip(self._scale * numbers[2:], _STEPS.min, _STEPS.max))
+        packet = np.frombuffer(bytearray(self._blank_command), self.command)
+        motors = packet[0]["motor"]
+        motors["mode"][JOINT_PLACES] = t.mode
+        for name, values in zip(_COMMANDED, numbers, strict=True):
+            motors[name][JOINT_PLACES] = values
+        return seal(packet.tobytes())
 
     def decode_command(self, packet: bytes) -> MotorTargets:
         """What a command asks of the motors, with the resolution of the packet.
@@ -208,31 +135,32 @@ class Codec:
         Raises:
             PacketError: the bytes are no command, or damaged.
         """
-        raw = self._open(packet, self.command, "command")
-        (mode,) = self._asked_modes.read(raw, np.uint8)
-        q, dq = self._angles.read(raw, float)
-        efforts = np.concatenate(self._efforts.read(raw, float)) / self._scales
-        return MotorTargets(mode, q, dq, *efforts.reshape(3, N_JOINTS))
+        motors = self._open(packet, self.command, "command")["motor"][JOINT_PLACES]
+        numbers = np.stack([motors[name] for name in _COMMANDED], dtype=float)
+        numbers[2:] /= self._scale
+        return MotorTargets(motors["mode"], *numbers)
 
     def encode_report(self, report: RobotReport) -> bytes:
         """The bytes that a robot sends."""
-        raw = np.frombuffer(self._blank_report.tobytes(), np.uint8).copy()
-        r, tau = report, self._tau_scale * report.tau
-        self._floats.write(raw, r.quat_wxyz, r.gyro, r.accel, r.q, r.dq)
-        if self._torques.kind.kind == "i":
-            tau = np.clip(np.rint(tau), _STEPS.min, _STEPS.max)
-        self._torques.write(raw, tau)
-        self._feet.write(raw, np.clip(np.rint(r.foot), _STEPS.min, _STEPS.max))
-        self._modes.write(raw, r.mode)
-        self._temperatures.write(raw, np.clip((*r.temperature, r.imu_temperature), -128, 127))
-        if self._lost is not None:
-            self._lost.write(raw, r.lost)
-        fields = raw.view(self.report)[0]
+        packet = np.frombuffer(bytearray(self._blank_report), self.report)
+        r, tau, fields = report, report.tau, packet[0]
+        imu, motors = fields["imu"], fields["motor"]
+        imu["quaternion"], imu["gyro"], imu["accel"] = r.quat_wxyz, r.gyro, r.accel
+        imu["temperature"] = min(127, max(-128, r.imu_temperature))
+        if self._in_steps:
+            tau = np.clip(np.rint(self._scale[0] * tau), _STEPS.min, _STEPS.max)
+        values = {"mode": r.mode, "q": r.q, "dq": r.dq, "tau": tau}
+        values["temperature"] = np.clip(r.temperature, -128, 127)
+        if self._counts_lost:
+            values["lost"] = r.lost
+        for name, numbers in values.items():
+            motors[name][JOINT_PLACES] = numbers
+        fields["foot"] = np.clip(np.rint(r.foot), _STEPS.min, _STEPS.max)[FOOT_PLACES]
         fields["tick"] = r.tick & 0xFFFFFFFF
         fields["remote"] = np.frombuffer(r.remote, np.uint8)
         if r.battery is not None and self._has_battery:
             self._write_battery(fields, r.battery)
-        return seal(raw.tobytes())
+        return seal(packet.tobytes())
 
     def decode_report(self, packet: bytes) -> RobotReport:
         """What a robot has sent. Numbers may be of any value, also none.
@@ -240,40 +168,24 @@ class Codec:
         Raises:
             PacketError: the bytes are no report, or damaged.
         """
-        raw = self._open(packet, self.report, "report")
-        quat, gyro, accel, q, dq = self._floats.read(raw, float)
-        (tau,), (foot,) = self._torques.read(raw, float), self._feet.read(raw, float)
-        (mode,) = self._modes.read(raw, np.uint8)
-        temperature, imu_temperature = self._temperatures.read(raw, float)
-        lost = np.zeros(N_JOINTS, np.int64)
-        if self._lost is not None:
-            (lost,) = self._lost.read(raw, np.int64)
-        fields = raw.view(self.report)[0]
+        fields = self._open(packet, self.report, "report")
+        imu, motors = fields["imu"], fields["motor"][JOINT_PLACES]
         return RobotReport(
             tick=int(fields["tick"]),
-            quat_wxyz=quat,
-            gyro=gyro,
-            accel=accel,
-            q=q,
-            dq=dq,
-            tau=tau / self._tau_scale,
-            foot=foot,
-            mode=mode,
-            temperature=temperature,
-            lost=lost,
-            imu_temperature=int(imu_temperature[0]),
+            quat_wxyz=imu["quaternion"].astype(float),
+            gyro=imu["gyro"].astype(float),
+            accel=imu["accel"].astype(float),
+            q=motors["q"].astype(float),
+            dq=motors["dq"].astype(float),
+            tau=motors["tau"].astype(float) / self._scale[0],
+            foot=fields["foot"][FOOT_PLACES].astype(float),
+            mode=motors["mode"],
+            temperature=motors["temperature"].astype(float),
+            lost=motors["lost"].astype(np.int64) if self._counts_lost else np.zeros(N_JOINTS, int),
+            imu_temperature=int(imu["temperature"]),
             remote=fields["remote"].tobytes(),
             battery=self._read_battery(fields) if self._has_battery else None,
         )
-
-    @property
-    def _has_battery(self) -> bool:
-        return "battery" in (self.report.names or ())
-
-    @property
-    def _tells_power(self) -> bool:
-        """Whether the voltage is a field, and not the sum of the cells'."""
-        return "power_v" in (self.report.names or ())
 
     def _write_battery(self, fields: Any, battery: Battery) -> None:
         cells = fields["battery"]
@@ -288,15 +200,8 @@ class Codec:
         voltage = fields["power_v"] if self._tells_power else _CELL_V * float(cells["cells"].sum())
         return Battery(int(cells["charge"]), 1e-3 * int(cells["current_ma"]), float(voltage))
 
-    @staticmethod
-    def _blank(layout: np.dtype[np.void]) -> Any:
-        packet = np.zeros((), layout)
-        if "head" in (layout.names or ()):
-            packet["head"] = tuple(_HEAD)
-        return packet
-
-    def _open(self, packet: bytes, layout: np.dtype[np.void], what: str) -> Raw:
-        """The bytes of a packet of this layout that is whole.
+    def _open(self, packet: bytes, layout: np.dtype[np.void], what: str) -> Any:
+        """A packet of this layout that is whole.
 
         Robots and other people's programs fill in the head and the level of a packet as they like:
         a Go2 leaves the level 0. So these decide nothing.
@@ -308,12 +213,12 @@ class Codec:
         if len(packet) != layout.itemsize:
             got, expected = f"{len(packet)} bytes", str(layout.itemsize)
             raise PacketError(f"{what}: size", got, expected, "another robot or firmware?")
+        fields = np.frombuffer(packet, layout)[0]
         if (right := seal(packet)) != packet:
             got, expected = (f"{int.from_bytes(p[-4:], 'little'):08x}" for p in (packet, right))
-            level = packet[2 if "head" in (layout.names or ()) else 0]
-            cause = f"damaged on its way? its level is {level:#04x}"
+            cause = f"damaged on its way? its level is {int(fields['level']):#04x}"
             raise PacketError(f"{what}: crc", got, expected, cause)
-        return np.frombuffer(packet, np.uint8)
+        return fields
 
 
 def _struct(fields: _Fields) -> np.dtype[np.void]:
@@ -349,7 +254,7 @@ _UDP_MOTOR_STATE: Final = np.dtype([
     ("dq_raw", "<f4"), ("ddq_raw", "<i2"), ("temperature", "i1"), ("reserve", "<u4", 2),
 ])  # fmt: skip
 _UDP_STATE: Final[_Fields] = [("imu", list(_IMU)), ("motor", _UDP_MOTOR_STATE, _MOTORS)]
-_UDP_SCALE: Final = {"tau": 256.0, "kp": 32.0, "kd": 16.0}
+_UDP_SCALE: Final = (256.0, 32.0, 16.0)  # of tau, kp, kd
 
 _GO2_MOTOR_COMMAND: Final = _struct([
     ("mode", "u1"), ("q", "f4"), ("dq", "f4"), ("tau", "f4"), ("kp", "f4"), ("kd", "f4"),

@@ -10,7 +10,6 @@ from __future__ import annotations
 import ctypes as c
 import importlib.util
 import zlib
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final, NamedTuple, Self
 
@@ -26,7 +25,6 @@ _SIZES: Final = {1: 1, 2: 2, 4: 3, 8: 4}  # code of a number by its bytes
 _KINDS: Final = {"u": 0, "i": 4, "f": 2}  # flag of a number by numpy's kind
 _SEQUENCE_OF_BYTES: Final = _ADDRESS | _SEQUENCE | _SIZES[1] << 8
 _THERE_ALREADY: Final = -4  # DDS_RETCODE_PRECONDITION_NOT_MET, of a domain
-_UNREAD: Final = 2 | 4 | 8 | 16  # any view, instances that are alive, samples not read
 _CONFIG: Final = (
     '<CycloneDDS><Domain Id="any"><General><Interfaces>'
     '<NetworkInterface name="{interface}" priority="default" multicast="default"/>'
@@ -66,7 +64,7 @@ class _Descriptor(c.Structure):
     )
 
 
-class SampleInfo(c.Structure):
+class _SampleInfo(c.Structure):
     """`dds_sample_info_t`."""
 
     _fields_ = (
@@ -110,19 +108,18 @@ def load_library() -> Any:
         ConfigError: it is not installed.
     """
     found = importlib.util.find_spec("cyclonedds")  # which does not import it
-    places = [] if found is None or found.origin is None else [Path(found.origin).parent]
-    for place in places:
-        folders = (place.parent / "cyclonedds.libs", place / ".libs")
-        for file in (path for folder in folders for path in sorted(folder.glob("libddsc*.so*"))):
-            library = c.CDLL(str(file))
-            for name, types in _ARGUMENTS.items():
-                function = getattr(library, name)
-                function.argtypes, function.restype = types, c.c_int32
-            library.dds_create_qos.restype = c.c_void_p
-            return library
-    raise ConfigError(
-        "the driver of the Go2", "no CycloneDDS", "its library", "pip install -e '.[go2]'"
-    )
+    place = Path(found.origin).parent if found and found.origin else Path()
+    folders = (place.parent / "cyclonedds.libs", place / ".libs")
+    files = [path for folder in folders for path in sorted(folder.glob("libddsc*.so*"))]
+    if not files:
+        cause = "pip install -e '.[go2]'"
+        raise ConfigError("the driver of the Go2", "no CycloneDDS", "its library", cause)
+    library = c.CDLL(str(files[0]))
+    for name, types in _ARGUMENTS.items():
+        function = getattr(library, name)
+        function.argtypes, function.restype = types, c.c_int32
+    library.dds_create_qos.restype = c.c_void_p
+    return library
 
 
 def operations(layout: np.dtype[Any], base: int = 0) -> list[int]:
@@ -131,28 +128,17 @@ def operations(layout: np.dtype[Any], base: int = 0) -> list[int]:
     On the wire that is the same: XCDR1 has neither padding of structs nor marks between them.
     """
     ops = list[int]()
-    for name in layout.names or ():
-        field, offset = _field_of(layout, name)
-        at = base + int(offset)
-        one, shape = field.subdtype or (field, ())
-        count = int(np.prod(shape)) if shape else 1
-        if one.names:
+    for field, offset, *_ in (layout.fields or {}).values():
+        at, count = base + offset, int(np.prod(field.shape))
+        if field.base.names:
             for k in range(count):
-                ops += operations(one, at + k * one.itemsize)
-            continue
-        kind, size = _KINDS[one.kind], _SIZES[one.itemsize]
-        if shape:
+                ops += operations(field.base, at + k * field.base.itemsize)
+        elif field.shape:
+            kind, size = _KINDS[field.base.kind], _SIZES[field.base.itemsize]
             ops += [_ADDRESS | _ARRAY | size << 8 | kind, at, count]
         else:
-            ops += number_at(at, one.kind, one.itemsize)
+            ops += number_at(at, field.kind, field.itemsize)
     return ops
-
-
-def _field_of(layout: np.dtype[Any], name: str) -> tuple[np.dtype[Any], int]:
-    if layout.fields is None:
-        raise TypeError(f"{layout} is no struct")
-    field, offset, *_ = layout.fields[name]
-    return field, offset
 
 
 def number_at(offset: int, kind: str, size: int) -> list[int]:
@@ -170,13 +156,33 @@ def bytes_at(offset: int) -> list[int]:
     return [_SEQUENCE_OF_BYTES, offset]
 
 
-def describe_topic(typename: str, size: int, alignment: int, ops: Sequence[int]) -> Any:
+class StructTopic(NamedTuple):
+    """A topic whose samples are structs in C: its name, its type, how the library finds the fields.
+
+    `ops` is made of `operations`, or of `number_at` and its like.
+    """
+
+    name: str
+    typename: str
+    size: int
+    alignment: int
+    ops: list[int]
+
+
+def _topic_of(name: str, typename: str, layout: np.dtype[np.void]) -> StructTopic:
+    return StructTopic(name, typename, layout.itemsize, layout.alignment, operations(layout))
+
+
+LOW_COMMANDS: Final = _topic_of("rt/lowcmd", "unitree_go::msg::dds_::LowCmd_", GO2.command)
+LOW_STATES: Final = _topic_of("rt/lowstate", "unitree_go::msg::dds_::LowState_", GO2.report)
+
+
+def describe_topic(topic: StructTopic) -> Any:
     """A topic's descriptor without type information, and what must live as long as it does."""
-    program = np.array([*ops, 0], dtype=np.uint32)
-    descriptor = _Descriptor(
-        size, alignment, 0, 0, typename.encode(), None, len(program), program.ctypes.data, b""
-    )
-    return descriptor, program
+    program = np.array([*topic.ops, 0], dtype=np.uint32)
+    where, name = program.ctypes.data, topic.typename.encode()
+    size, alignment = topic.size, topic.alignment
+    return _Descriptor(size, alignment, 0, 0, name, None, len(program), where, b""), program
 
 
 class DdsParticipant:
@@ -208,26 +214,20 @@ class DdsParticipant:
         self.handle = self._check(created, where)
         self._kept: list[Any] = []
 
-    def topic(self, name: str, typename: str, size: int, alignment: int, ops: list[int]) -> int:
+    def topic(self, topic: StructTopic) -> int:
         """Declare a topic.
 
         Raises:
             BridgeError: it is there with another type.
         """
-        descriptor, program = describe_topic(typename, size, alignment, ops)
+        descriptor, program = describe_topic(topic)
         self._kept += [descriptor, program]
-        made = self.library.dds_create_topic(
-            self.handle, c.addressof(descriptor), name.encode(), None, None
-        )
-        return self._check(made, f"DDS topic {name}")
+        where, name = c.addressof(descriptor), topic.name.encode()
+        made = self.library.dds_create_topic(self.handle, where, name, None, None)
+        return self._check(made, f"DDS topic {topic.name}")
 
     def reader(self, topic: int, *, of_others: bool = False) -> int:
-        """A reader: best effort, keeps the last samples.
-
-        Args:
-            topic: that it reads.
-            of_others: whether it reads nothing that this participant writes.
-        """
+        """A reader: best effort, keeps the last samples, perhaps only `of_others`."""
         qos = self.library.dds_create_qos()
         self.library.dds_qset_history(qos, _KEEP_LAST, _KEPT)
         self.library.dds_qset_ignorelocal(qos, _NOT_MINE if of_others else 0)
@@ -270,24 +270,6 @@ class DdsParticipant:
         return handle
 
 
-class StructTopic(NamedTuple):
-    """A topic whose samples are structs of numbers: its name, its type, its layout in C."""
-
-    name: str
-    typename: str
-    layout: np.dtype[np.void]
-
-
-LOW_COMMANDS: Final = StructTopic("rt/lowcmd", "unitree_go::msg::dds_::LowCmd_", GO2.command)
-LOW_STATES: Final = StructTopic("rt/lowstate", "unitree_go::msg::dds_::LowState_", GO2.report)
-
-
-def _declare(participant: DdsParticipant, topic: StructTopic) -> int:
-    layout = topic.layout
-    size, alignment, ops = layout.itemsize, layout.alignment, operations(layout)
-    return participant.topic(topic.name, topic.typename, size, alignment, ops)
-
-
 class StructReader:
     """Takes samples of a topic.
 
@@ -304,10 +286,10 @@ class StructReader:
         self, participant: DdsParticipant, topic: StructTopic, *, of_others: bool = False
     ) -> None:
         self._library = participant.library
-        self.handle = participant.reader(_declare(participant, topic), of_others=of_others)
-        self._sample = c.create_string_buffer(topic.layout.itemsize)
+        self.handle = participant.reader(participant.topic(topic), of_others=of_others)
+        self._sample = c.create_string_buffer(topic.size)
         self._samples = (c.c_void_p * 1)(c.addressof(self._sample))
-        self._info = SampleInfo()
+        self._info = _SampleInfo()
 
     def take(self) -> bytes | None:
         """The oldest sample that has not been taken; None if there is none."""
@@ -328,8 +310,8 @@ class StructWriter:
 
     def __init__(self, participant: DdsParticipant, topic: StructTopic) -> None:
         self._library = participant.library
-        self.handle = participant.writer(_declare(participant, topic))
-        self._sample = c.create_string_buffer(topic.layout.itemsize)
+        self.handle = participant.writer(participant.topic(topic))
+        self._sample = c.create_string_buffer(topic.size)
 
     def send(self, sample: bytes) -> bool:
         """Write; whether the library took it."""

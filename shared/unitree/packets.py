@@ -114,25 +114,18 @@ class RobotReport:
 
 def pressed_buttons(remote: bytes) -> frozenset[str]:
     """Names of the buttons that are down in the 40 bytes of a report, of `BUTTONS`."""
-    _, keys = _KEYS.unpack_from(remote)
+    return _buttons_of(_KEYS.unpack_from(remote)[1])
+
+
+@cache
+def _buttons_of(keys: int) -> frozenset[str]:
     return frozenset(name for bit, name in enumerate(BUTTONS) if keys >> bit & 1)
-
-
-def are_pressed(remote: bytes, buttons: frozenset[str]) -> bool:
-    """Whether all these buttons are down in the 40 bytes of a report, and perhaps others."""
-    _, keys = _KEYS.unpack_from(remote)
-    wanted = _bits(buttons)
-    return bool(keys & wanted == wanted)
 
 
 def remote_bytes(buttons: frozenset[str] = frozenset()) -> bytes:
     """The 40 bytes of a remote control that is on while these buttons are down, sticks at rest."""
-    return _KEYS.pack(_REMOTE_HEAD, _bits(buttons)).ljust(REMOTE_BYTES, b"\0")
-
-
-@cache
-def _bits(buttons: frozenset[str]) -> int:
-    return sum(1 << bit for bit, name in enumerate(BUTTONS) if name in buttons)
+    bits = sum(1 << bit for bit, name in enumerate(BUTTONS) if name in buttons)
+    return _KEYS.pack(_REMOTE_HEAD, bits).ljust(REMOTE_BYTES, b"\0")
 
 
 def parse_buttons(text: str, name: str) -> frozenset[str]:

@@ -9,7 +9,15 @@ import ctypes as c
 from collections.abc import Iterator
 from typing import Any, Final, NamedTuple
 
-from quadriga.shared.unitree.dds import DdsParticipant, SampleInfo, bytes_at, number_at, string_at
+from quadriga.shared.unitree.dds import (
+    DdsParticipant,
+    StructReader,
+    StructTopic,
+    StructWriter,
+    bytes_at,
+    number_at,
+    string_at,
+)
 
 MOTION_SWITCHER: Final = "motion_switcher"
 SPORT: Final = "sport"
@@ -18,10 +26,6 @@ API_VERSION: Final = 1  # of every service
 STAND_DOWN: Final = 1005  # of sport
 OK: Final = 0
 UNKNOWN: Final = 3203  # there is no such call
-
-_REQUEST_TYPE: Final = "unitree_api::msg::dds_::Request_"
-_RESPONSE_TYPE: Final = "unitree_api::msg::dds_::Response_"
-_INT64, _INT32, _BOOL = ("i", 8), ("i", 4), ("u", 1)  # numpy's kind, and bytes
 
 
 class _RpcBytes(c.Structure):
@@ -40,7 +44,7 @@ class _RpcRequest(c.Structure):
         ("lease", c.c_int64),
         ("priority", c.c_int32),
         ("no_reply", c.c_bool),
-        ("parameter", c.c_char_p),
+        ("text", c.c_char_p),
         ("binary", _RpcBytes),
     )
 
@@ -50,26 +54,23 @@ class _RpcResponse(c.Structure):
         ("id", c.c_int64),
         ("api", c.c_int64),
         ("code", c.c_int32),
-        ("data", c.c_char_p),
+        ("text", c.c_char_p),
         ("binary", _RpcBytes),
     )
 
 
-def _operations(layout: Any, numbers: dict[str, tuple[str, int]], text: str) -> list[int]:
+def _operations(layout: type[c.Structure]) -> list[int]:
+    """How the library finds the fields of one of these structs."""
     ops = list[int]()
-    for name, (kind, size) in numbers.items():
-        ops += number_at(getattr(layout, name).offset, kind, size)
-    return [*ops, *string_at(getattr(layout, text).offset), *bytes_at(layout.binary.offset)]
-
-
-_REQUEST_OPS: Final = _operations(
-    _RpcRequest,
-    {"id": _INT64, "api": _INT64, "lease": _INT64, "priority": _INT32, "no_reply": _BOOL},
-    "parameter",
-)
-_RESPONSE_OPS: Final = _operations(
-    _RpcResponse, {"id": _INT64, "api": _INT64, "code": _INT32}, "data"
-)
+    for name, kind, *_ in layout._fields_:
+        at = getattr(layout, name).offset
+        if kind is c.c_char_p:
+            ops += string_at(at)
+        elif kind is _RpcBytes:
+            ops += bytes_at(at)
+        else:
+            ops += number_at(at, "u" if kind is c.c_bool else "i", c.sizeof(kind))
+    return ops
 
 
 class RpcMessage(NamedTuple):
@@ -101,47 +102,40 @@ class RpcEnd:
     """
 
     def __init__(self, participant: DdsParticipant, service: str, *, serves: bool) -> None:
-        self._participant, self._library, self.service = participant, participant.library, service
-        topics = {
-            kind: participant.topic(
-                f"rt/api/{service}/{kind}", typename, c.sizeof(layout), c.alignment(layout), ops
+        self._participant, self._serves, self.service = participant, serves, service
+        layouts = {"request": _RpcRequest, "response": _RpcResponse}
+        topics = [
+            StructTopic(
+                f"rt/api/{service}/{kind}",
+                f"unitree_api::msg::dds_::{kind.capitalize()}_",
+                c.sizeof(layout),
+                c.alignment(layout),
+                _operations(layout),
             )
-            for kind, typename, layout, ops in (
-                ("request", _REQUEST_TYPE, _RpcRequest, _REQUEST_OPS),
-                ("response", _RESPONSE_TYPE, _RpcResponse, _RESPONSE_OPS),
-            )
-        }
-        mine, others = ("response", "request") if serves else ("request", "response")
-        self._serves = serves
-        self._writer, self._reader = (
-            participant.writer(topics[mine]),
-            participant.reader(topics[others]),
-        )
-        self._sample: Any = _RpcRequest() if serves else _RpcResponse()
-        self._samples = (c.c_void_p * 1)(c.addressof(self._sample))
-        self._info = SampleInfo()
+            for kind, layout in layouts.items()
+        ]
+        self._writer = StructWriter(participant, topics[serves])
+        self._reader = StructReader(participant, topics[not serves])
 
     @property
     def is_linked(self) -> bool:
         """Whether somebody is at the other end: what is sent before is lost."""
-        seen = self._participant
-        return bool(seen.readers_seen_by(self._writer) and seen.writers_seen_by(self._reader))
+        seen, there = self._participant, self._writer.handle
+        return bool(seen.readers_seen_by(there) and seen.writers_seen_by(self._reader.handle))
 
     def send(self, message: RpcMessage) -> bool:
         """Send; whether the library took it."""
+        number, api, text, code = message
+        sample: Any = _RpcRequest(number, api, text=text.encode())
         if self._serves:
-            sample: Any = _RpcResponse(message.id, message.api, message.code, message.text.encode())
-        else:
-            sample = _RpcRequest(message.id, message.api, parameter=message.text.encode())
-        return bool(self._library.dds_write(self._writer, c.addressof(sample)) >= 0)
+            sample = _RpcResponse(number, api, code, text.encode())
+        return self._writer.send(bytes(sample))
 
     def receive(self) -> Iterator[RpcMessage]:
         """What has come since the last call."""
-        where = c.addressof(self._samples), c.addressof(self._info)
-        while self._library.dds_take(self._reader, *where, 1, 1) > 0:
-            if not self._info.valid_data:
-                continue
-            sample = self._sample
-            text = (sample.parameter if self._serves else sample.data) or b""
+        layout: Any = _RpcRequest if self._serves else _RpcResponse
+        while (raw := self._reader.take()) is not None:
+            sample = layout.from_buffer_copy(raw)  # its text is the reader's, until the next
             code = OK if self._serves else int(sample.code)
-            yield RpcMessage(int(sample.id), int(sample.api), text.decode(errors="replace"), code)
+            text = (sample.text or b"").decode(errors="replace")
+            yield RpcMessage(int(sample.id), int(sample.api), text, code)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import socket
 from collections.abc import Iterator
 from typing import Final, NamedTuple
@@ -11,10 +10,6 @@ from quadriga.shared.errors import BridgeError, ConfigError, system_reason
 
 _LONGEST: Final = 2048  # bytes: longer than any packet, so that one too long is seen as such
 _AT_ONCE: Final = 64  # packets of a call: a flood must not hold up who drains it
-_REFUSED: Final = {  # what the system refuses: what would have been right, and the likely cause
-    errno.EADDRINUSE: ("a free port", "does a bridge run already?"),
-    errno.EADDRNOTAVAIL: ("an address of this machine", "`ip address` lists them"),
-}
 
 
 class Address(NamedTuple):
@@ -43,10 +38,8 @@ def parse_address(text: str, name: str, default: Address) -> Address:
     try:
         return Address(host and socket.gethostbyname(host), int(port))
     except (OSError, UnicodeError) as error:
-        cause = "a name that does not resolve? write the address in numbers"
-        raise ConfigError(
-            name, f"{text!r}: {error}", "a host that has an IPv4 address", cause
-        ) from None
+        expected, cause = "a host that has an IPv4 address", "write the address in numbers"
+        raise ConfigError(name, f"{text!r}: {error}", expected, cause) from None
 
 
 class UdpPort:
@@ -65,8 +58,9 @@ class UdpPort:
         except OSError as error:
             self._socket.close()
             where = f"UDP port {local.port} of {local.host or 'this machine'}"
-            expected = _REFUSED.get(error.errno or 0, ("a port that may be used", ""))
-            raise BridgeError(where, system_reason(error), *expected) from None
+            cause = "does a bridge run already? `ip address` lists this machine's addresses"
+            expected = "a free port of this machine"
+            raise BridgeError(where, system_reason(error), expected, cause) from None
 
     def drain(self) -> Iterator[tuple[bytes, Address]]:
         """Packets that have come, oldest first, with who sent them."""

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 from scipy import ndimage
 
-from quadriga.shared.config.world import WorldConfig
+from quadriga.shared.config.sections import WorldConfig
 from quadriga.shared.robots.conventions import Array
 from quadriga.sim_server.terrain.terrain import (
     EARTH,

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from quadriga.shared.config.world import WorldConfig
+from quadriga.shared.config.sections import WorldConfig
 from quadriga.shared.robots.conventions import N_LEGS, Array
 from quadriga.sim_server.terrain.terrain import STONE_CONTACT, Course, Rectangle, Stones, Terrain
 

@@ -27,7 +27,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from quadriga.shared.config.motors import MotorsConfig
+from quadriga.shared.config.sections import MotorsConfig
 from quadriga.shared.messages import Command
 from quadriga.shared.robots.conventions import N_JOINTS, N_LEGS, Array
 from quadriga.shared.robots.spec import RobotSpec

@@ -9,7 +9,7 @@ from typing import Any, Final
 import mujoco
 import numpy as np
 
-from quadriga.shared.config.motors import MotorsConfig
+from quadriga.shared.config.sections import MotorsConfig
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.robots.conventions import FOOT_FRAMES, JOINT_NAMES, Array, Leg
 from quadriga.shared.robots.spec import RobotSpec

@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from quadriga.shared import codes
-from quadriga.shared.config.payload import carriers
+from quadriga.shared.config.per_robot import carriers
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.terrains import TERRAINS
 from quadriga.shared.errors import ConfigError

@@ -10,12 +10,11 @@ from typing import Final
 import mujoco
 import numpy as np
 
-from quadriga.shared.config.friction import friction_of_robots
+from quadriga.shared.config.per_robot import friction_of_robots
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.terrains import TERRAINS
-from quadriga.shared.config.yokes import yoke_pairs
 from quadriga.shared.robots.colours import robot_rgb
-from quadriga.shared.robots.conventions import FOOT_FRAMES, GRAVITY, Array, robot_names
+from quadriga.shared.robots.conventions import FOOT_FRAMES, GRAVITY, Array, robot_names, yoke_pairs
 from quadriga.sim_server.terrain.terrain import NO_CONTACT, Terrain, add_plane, build_course
 from quadriga.sim_server.world.layout import JOINT_POSITIONS, NQ
 from quadriga.sim_server.world.robot_body import VISUAL_GROUP, RobotBody

@@ -21,14 +21,13 @@ ALONE = Config(team=TeamConfig(robots=1))
 FIRST_CALLS = """
 from quadriga.agents.agent import Agent
 from quadriga.agents.rehearsal import rehearse
-from quadriga.shared import flat_bytes
 from quadriga.shared.config.sections import Config, TeamConfig
 from quadriga.sim_server.world import motors
 from quadriga.plant.commands import CommandBox
 from quadriga.sim_server.world.world import World
 config = Config(team=TeamConfig(robots=1))
 WHAT
-first = flat_bytes.read_flat.signatures + motors._drive.signatures
+first = motors._drive.signatures
 print(len(first))
 """
 

@@ -9,7 +9,7 @@ import pytest
 
 from quadriga.bridges.drivers import Go2Driver
 from quadriga.bridges.plant import RobotPlant
-from quadriga.shared.config.bridge import BridgeConfig
+from quadriga.shared.config.sections import BridgeConfig
 from quadriga.shared.errors import BridgeError, ConfigError
 from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.unitree import rpc

@@ -119,7 +119,7 @@ def test_it_is_exported_with_the_names_of_its_entries(
 
 
 def test_it_is_documented(environment: dict[str, str]) -> None:
-    page = run(environment, "quadriga.shared.messages_page").splitlines()
+    page = run(environment, "quadriga.shared.schema").splitlines()
     row = "| `wind` |  | [Wind](#wind) | anemometer |  | 100 ms | 1000 ms | yes |"
     assert row in page
     assert "| `velocity` | 3 | m/s | world |" in page

@@ -2,39 +2,21 @@
 
 from __future__ import annotations
 
-import pytest
-
 from quadriga.shared.about import ABOUT, About, scheduling_of, stage_of
 from quadriga.shared.bus.process_info import describe_process
 from quadriga.shared.codec import decode, encode
 from quadriga.shared.config.load import load
 
 
-@pytest.mark.parametrize(
-    ("reached", "met", "stage"),
-    [
-        (set(), False, "started"),
-        ({"here"}, False, "here"),
-        ({"here"}, True, "warming-up"),
-        ({"here", "ready"}, True, "ready"),
-        ({"here", "ready"}, False, "ready"),
-    ],
-)
-def test_stages(reached: set[str], met: bool, stage: str) -> None:
-    assert stage_of(frozenset(reached), met=met) == stage
-
-
-@pytest.mark.parametrize(
-    ("wanted", "granted", "stage", "scheduling"),
-    [
-        (True, True, "ready", "realtime"),
-        (True, False, "ready", "refused"),
-        (True, False, "warming-up", "ordinary"),  # it has not asked yet
-        (False, False, "ready", "ordinary"),
-    ],
-)
-def test_scheduling(wanted: bool, granted: bool, stage: str, scheduling: str) -> None:
-    assert scheduling_of(wanted=wanted, granted=granted, stage=stage) == scheduling
+def test_how_far_a_process_is_and_how_it_is_scheduled() -> None:
+    here, both = frozenset({"here"}), frozenset({"here", "ready"})
+    stages = [stage_of(frozenset(), met=False), stage_of(here, met=False), stage_of(here, met=True)]
+    assert [*stages, stage_of(both, met=False)] == ["started", "here", "warming-up", "ready"]
+    assert scheduling_of(wanted=True, granted=True, stage="ready") == "realtime"
+    assert scheduling_of(wanted=True, granted=False, stage="ready") == "refused"
+    # It has not asked yet, or will not.
+    assert scheduling_of(wanted=True, granted=False, stage="warming-up") == "ordinary"
+    assert scheduling_of(wanted=False, granted=False, stage="ready") == "ordinary"
 
 
 def test_an_answer_survives_the_wire_and_is_small() -> None:

@@ -1,12 +1,16 @@
-"""Programs decide by codes: each is in the table."""
+"""Programs decide by codes: each is in the table, on the wire and in a log."""
 
 from __future__ import annotations
 
+from hypothesis import given
+from hypothesis import strategies as st
+
 from quadriga.shared import codes
 from quadriga.shared.codec import decode, encode
-from quadriga.shared.messages import Event
+from quadriga.shared.messages import Event, format_event, parse_events
 
 KINDS = {"start", "terrain", "payload", "push", "bridge", "fall", "fault", "stop"}
+PLAIN = st.text(st.characters(min_codepoint=32, max_codepoint=126), max_size=60)
 
 
 def test_every_code_has_a_kind_and_a_meaning() -> None:
@@ -16,13 +20,17 @@ def test_every_code_has_a_kind_and_a_meaning() -> None:
     assert all(code.meaning for code in codes.EVENTS.values())
 
 
-def test_an_event_keeps_its_code_on_the_wire() -> None:
-    event = Event(5, 5_000_000, "fault", "r1", "in any words", codes.RESET)
-    assert decode(encode(event), Event) == event
-
-
 def test_the_code_of_a_status_or_reason_stands_before_its_detail() -> None:
     assert codes.with_detail("estop", "fall: a dog") == "estop:fall: a dog"
-    assert codes.code_of("nominal:infeasible") == "nominal"
     assert codes.code_of("estop:fall: a dog") == "estop"
     assert (codes.code_of("solved"), codes.code_of("")) == ("solved", "")
+
+
+@given(st.integers(0, 10**9), st.sampled_from(sorted(codes.EVENTS)), PLAIN)
+def test_a_log_gives_back_the_events_that_were_written_into_it(
+    tick: int, code: str, detail: str
+) -> None:
+    events = [Event.of(tick, code, robot, detail) for robot in ("", "r2")]
+    assert [decode(encode(event), Event) for event in events] == events
+    lines = ["routing at tcp/127.0.0.1:7447", "12 ms: nonsense r1 x", "x ms: fall r1 x", ""]
+    assert list(parse_events([*lines, *map(format_event, events)])) == events

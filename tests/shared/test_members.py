@@ -21,8 +21,7 @@ from quadriga.shared.members import (
 ROBOTS = ("r1", "r2")
 
 
-@pytest.mark.parametrize("central", [False, True])
-@pytest.mark.parametrize("recorded", [False, True])
+@pytest.mark.parametrize(("central", "recorded"), [(False, True), (True, False)])
 def test_a_team_has_what_its_configuration_asks_for(central: bool, recorded: bool) -> None:
     names = [m.name for m in team_members(ROBOTS, central=central, recorded=recorded)]
     planner, recorder = ["planner"] * central, ["recorder"] * recorded

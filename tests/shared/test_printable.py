@@ -18,10 +18,7 @@ def test_what_a_terminal_would_obey_is_replaced(character: str) -> None:
     assert printable(f"r2 {character}[31m fell") == f"r2 {SHOWN}[31m fell"
 
 
-def test_all_else_stays() -> None:
+def test_all_else_stays_and_no_line_is_forged() -> None:
     text = "r2: 0.5 m · τ ≤ 33 N·m,\N{NO-BREAK SPACE}– \n next"
     assert printable(text) == text
-
-
-def test_no_line_is_forged() -> None:
     assert printable_line("stop\nquadriga: all is well") == "stop quadriga: all is well"

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -56,34 +53,21 @@ def test_a_row_of_another_package_follows_the_own_ones(install: Install) -> None
 
 
 @pytest.mark.parametrize(
-    ("row", "message"),
+    ("row", "got"),
     [
-        ('"smell"', "got 'smell', expected a Topic"),
-        ('Topic("smell", int, (), (), period_ms=0)', "expected a Message"),
-        ('Topic("state", Smell, (), (), period_ms=0)', "got 'state', expected a name of its own"),
-        ('Topic("a b", Smell, (), (), period_ms=0)', "got 'a b', expected a name of its own"),
-        ('Topic("smell", State, (), (), period_ms=0)', "got State, expected a message type with"),
-        ('Topic("smell", Smell, (), (), period_ms=-1)', "period_ms -1, .*expected at least 0"),
-        ('Topic("smell", Smell, (), ("agent",), period_ms=0)', "got agent, expected receivers of"),
-        ("Smel", "got NameError: .*expected a row that can be imported"),
+        ('"smell"', "'smell'"),
+        ('Topic("smell", int, (), (), period_ms=0)', "<class 'int'>"),
+        ('Topic("state", Smell, (), (), period_ms=0)', "'state'"),
+        ('Topic("a b", Smell, (), (), period_ms=0)', "'a b'"),
+        ('Topic("smell", State, (), (), period_ms=0)', "State"),
+        ('Topic("smell", Smell, (), (), period_ms=-1)', "period_ms -1, max_age_ms 0"),
+        ('Topic("smell", Smell, (), ("agent",), period_ms=0)', "agent"),
+        ("Smel", "NameError: name 'Smel' is not defined"),
     ],
 )
-def test_another_row_is_refused_by_name(install: Install, row: str, message: str) -> None:
+def test_another_row_is_refused_by_name(install: Install, row: str, got: str) -> None:
     name = install(row)
-    with pytest.raises(ConfigError, match=message) as error:
+    with pytest.raises(ConfigError) as error:
         plugin_topics(TABLE)
-    assert f"entry point smell = {name}:ROW in quadriga.topics of {name} 2.0" in str(error.value)
-
-
-def test_it_costs_a_command_one_line(install: Install, tmp_path: Path) -> None:
-    install("None")
-    path = os.pathsep.join(filter(None, [str(tmp_path), os.environ.get("PYTHONPATH")]))
-    done = subprocess.run(
-        [sys.executable, "-m", "quadriga", "version"],
-        env={**os.environ, "PYTHONPATH": path},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
-    assert done.stderr.startswith("quadriga: entry point smell = ")
+    assert error.value.name == f"entry point smell = {name}:ROW in quadriga.topics of {name} 2.0"
+    assert error.value.got.startswith(got)

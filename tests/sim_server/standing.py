@@ -8,9 +8,14 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from quadriga.shared.config.motors import MotorsConfig
 from quadriga.shared.config.presets import PRESETS
-from quadriga.shared.config.sections import Config, SensorsConfig, TeamConfig, WorldConfig
+from quadriga.shared.config.sections import (
+    Config,
+    MotorsConfig,
+    SensorsConfig,
+    TeamConfig,
+    WorldConfig,
+)
 from quadriga.shared.messages import Command
 from quadriga.shared.robots.conventions import N_JOINTS
 from quadriga.sim_server.world.world import World

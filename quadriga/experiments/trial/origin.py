@@ -13,8 +13,8 @@ from typing import Final
 
 from quadriga.agents.predictor.store import versions
 from quadriga.identification.behaviour import behaviour, sources_digest
+from quadriga.shared.agent_command import command_origin
 from quadriga.shared.config.sections import Config
-from quadriga.shared.controller_line import controller_origin
 from quadriga.shared.planner_kinds import plugin_origin
 from quadriga.shared.runtime.arithmetic import arithmetic_digest
 
@@ -32,7 +32,7 @@ def foreign_origin(config: Config) -> str:
     Raises:
         ConfigError: it cannot be found, or not be read.
     """
-    return controller_origin(config.team.agent_command) or plugin_origin(config.planner.kind)
+    return command_origin(config.team.agent_command) or plugin_origin(config.planner.kind)
 
 
 @lru_cache(maxsize=1)

@@ -14,10 +14,9 @@ from quadriga.agents.planner.qp_solver import SOLVED
 from quadriga.agents.time_grid import step_ms
 from quadriga.recordings.checks.finding import CheckedMessage, Finding
 from quadriga.shared.config.sections import Config
-from quadriga.shared.config.yokes import neighbours
 from quadriga.shared.messages import Plan, Status
 from quadriga.shared.planner_kinds import find_kind
-from quadriga.shared.robots.conventions import robot_names
+from quadriga.shared.robots.conventions import neighbours, robot_names
 
 GIVEN_UP: Final = "waits_given_up"  # the agent's count of messages it no longer waited for
 _NO_ARRAY: Final = np.zeros((0, 0))

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from quadriga.shared.agent_command import PLACES
 from quadriga.shared.config.load import load
-from quadriga.shared.controller_line import PLACES
 from quadriga.shared.errors import ConfigError
 from quadriga.team.controller_program import become_controller, check_controller, places_of
 

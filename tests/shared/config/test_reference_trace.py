@@ -55,21 +55,14 @@ def test_the_seed_says_where_it_begins_if_asked_to(good: Path) -> None:
     assert again.at(1.0) == pytest.approx(traced(good).at(1.0 + begins[2]))
 
 
-def test_without_a_trace_there_is_none() -> None:
-    assert trace_of(Config()) is None
-
-
 @pytest.mark.parametrize(
     ("text", "message"),
     [
         ("", "nothing"),
         ("0,0,0,0\n1,0,0,0\n", "t,vx,vy,wz"),
         ("t,vx,vy,wz\n0,0,0,0\n", "at least two"),
-        ("t,vx,vy,wz\n0,0,0\n1,0,0\n", "lines of four"),
         ("t,vx,vy,wz\n0,0,0,0\n1,0,0\n", "four numbers"),
-        ("t,vx,vy,wz\n0,0,0,0\n1,fast,0,0\n", "four numbers"),
         ("t,vx,vy,wz\n0,0,0,0\n0,0,0,0\n", "t rising"),
-        ("t,vx,vy,wz\n1,0,0,0\n2,0,0,0\n", "t rising"),
         ("t,vx,vy,wz\n0,0,0,0\n1,nan,0,0\n", "finite"),
         ("t,vx,vy,wz\n0,0,0,0\n1,0,0.9,0\n", "vy of 0 … 0.9"),
     ],
@@ -80,11 +73,9 @@ def test_what_is_no_trace_is_one_clear_error(tmp_path: Path, text: str, message:
     with pytest.raises(ConfigError, match=message) as caught:
         traced(path)
     assert caught.value.name == f"reference.trace {path}"
-
-
-def test_a_file_that_is_not_there_is_named() -> None:
-    with pytest.raises(ConfigError, match=r"nowhere\.csv: got No such file"):
-        traced("nowhere.csv")
+    path.unlink()
+    with pytest.raises(ConfigError, match="No such file"):
+        traced(path)
 
 
 def test_the_joystick_of_the_scenarios_is_smooth_and_moderate() -> None:
@@ -102,17 +93,14 @@ def test_a_configuration_holds_what_the_file_says_and_needs_it_no_more(good: Pat
     found = config(good)
     before = trace_of(found)
     good.unlink()
-    assert found.reference.trace == (
-        "t,vx,vy,wz;0,0,0,0;1.0,0.4,0.1,-0.2;2.0,0.4,0.0,0.0;4.0,0,0,0"
-    )
+    assert found.reference.trace == "t,vx,vy,wz;0,0,0,0;1.0,0.4,0.1,-0.2;2.0,0.4,0.0,0.0;4.0,0,0,0"
     assert trace_sha256(found) == ""
     again = build(tomllib.loads(to_toml(found)))
     assert again == found
     after = trace_of(again)
     assert before is not None
     assert after is not None
-    np.testing.assert_array_equal(after.t, before.t)
-    np.testing.assert_array_equal(after.v, before.v)
+    np.testing.assert_array_equal(np.c_[after.t, after.v], np.c_[before.t, before.v])
 
 
 def test_a_path_in_a_configuration_from_elsewhere_is_not_opened(good: Path) -> None:

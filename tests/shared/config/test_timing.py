@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from quadriga.shared.config.load import load
-from quadriga.shared.config.sections import Config, EstimatorConfig, PlannerConfig, WorldConfig
+from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import max_ages, periods
 from quadriga.shared.topics import CONFIGURED, TABLE
 
 
 def test_periods_follow_the_configuration() -> None:
-    assert periods(Config())["plan"] == 40
-    assert periods(Config())["sim/truth"] == 10
-    other = Config(
-        planner=PlannerConfig(applied=2),
-        estimator=EstimatorConfig(kind="truth"),
-        world=WorldConfig(mode="realtime"),
-    )
-    assert (periods(other)["plan"], periods(other)["sim/truth"]) == (20, 1)
-    assert periods(other)["status"] == 0
+    assert (periods(Config())["plan"], periods(Config())["sim/truth"]) == (40, 10)
+    keys = {"planner.applied": 2, "estimator.kind": "truth", "world.mode": "realtime"}
+    other = periods(load(None, keys))
+    assert (other["plan"], other["sim/truth"], other["status"]) == (20, 1, 0)
+    bridged = {"team.plant": "robots", "team.plant_per_robot": True, "world.mode": "realtime"}
+    assert periods(load(None, bridged))["state"] == 10
 
 
 def test_what_the_table_says_holds_whatever_is_configured() -> None:

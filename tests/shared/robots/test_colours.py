@@ -45,4 +45,3 @@ def test_a_colour_is_its_robots_in_every_notation() -> None:
         levels = [round(255 * share) for share in robot_rgb(index)]
         assert "#" + "".join(f"{level:02x}" for level in levels) == robot_colour(index)
     assert robot_colour(0) == robot_colour(N_ROBOT_COLOURS)
-    assert robot_rgb(0) == pytest.approx((0.0, 0x78 / 255, 0xB4 / 255))

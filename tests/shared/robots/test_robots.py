@@ -160,19 +160,17 @@ def test_sizes_belong_together() -> None:
     assert robot_names(3) == ("r1", "r2", "r3")
 
 
-def test_a_urdf_without_what_the_record_changes_is_one_clear_error() -> None:
+def test_a_description_that_is_missing_or_another_is_one_clear_error(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     with pytest.raises(ConfigError, match="wing"):
         replace(A1, urdf_changes={"link[@name='wing']": {}}).urdf_tree()
-
-
-def test_a_missing_robot_description_is_one_clear_error(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
     with pytest.raises(ConfigError, match="make install"):
         A1.urdf_path()
 
 
-@pytest.mark.parametrize("kind", ROBOTS)
-def test_a_foot_is_lowered_no_farther_than_the_knees_stop_allows(kind: str) -> None:
-    robot = ROBOTS[kind]
+@every_robot
+def test_a_foot_is_lowered_no_farther_than_the_knees_stop_allows(robot: RobotSpec) -> None:
     stretched = 2.0 * robot.geometry.link * np.cos(0.5 * robot.upper[2])
     assert stretched - 0.01 < robot.reach < stretched

@@ -21,7 +21,6 @@ from quadriga.shared.unitree.dds import (
     StructWriter,
     describe_topic,
     load_library,
-    operations,
 )
 from quadriga.shared.unitree.packets import MotorTargets
 from quadriga.shared.unitree.rpc import RpcEnd, RpcMessage
@@ -38,13 +37,12 @@ def participant() -> Iterator[DdsParticipant]:
 
 def test_a_topic_has_no_type_information() -> None:
     """With it, processes of version 0.10 on the same topic end: the robot's own among them."""
-    for _, typename, layout in (LOW_COMMANDS, LOW_STATES):
-        ops = operations(layout)
-        descriptor, program = describe_topic(typename, layout.itemsize, layout.alignment, ops)
+    for topic in (LOW_COMMANDS, LOW_STATES):
+        descriptor, program = describe_topic(topic)
         for part in (descriptor.type_information, descriptor.type_mapping):
             assert (part.data, part.size) == (None, 0)
         assert descriptor.flags == 0
-        assert descriptor.ops_count == len(program) == len(ops) + 1
+        assert descriptor.ops_count == len(program) == len(topic.ops) + 1
 
 
 def test_the_python_package_is_never_imported() -> None:

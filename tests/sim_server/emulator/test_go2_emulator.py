@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from quadriga.bridges.drivers import Go2Driver
-from quadriga.shared.config.bridge import BridgeConfig
 from quadriga.shared.config.load import load
+from quadriga.shared.config.sections import BridgeConfig
 from quadriga.shared.messages import Command
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.sim_server.emulator.link import LinkFaults

@@ -10,8 +10,8 @@ import pytest
 
 from quadriga.bridges.drivers import UdpDriver
 from quadriga.bridges.plant import bridge_of
-from quadriga.shared.config.bridge import BridgeConfig
 from quadriga.shared.config.load import load
+from quadriga.shared.config.sections import BridgeConfig
 from quadriga.shared.errors import BridgeError, ConfigError
 from quadriga.shared.messages import Command
 from quadriga.shared.robots.conventions import JOINT_NAMES

@@ -1,7 +1,6 @@
-"""The command line of a controller of one's own: how it is read, filled in and told apart.
+"""The command line of a program of one's own that is the agent of each robot.
 
-Any program that speaks `state` and `command` may be the agent of each robot, see
-docs/tutorials/own_controller.md. The key `team.agent_command` says how it is started.
+Any program that speaks `state` and `command` may be one, see docs/tutorials/own_controller.md.
 """
 
 from __future__ import annotations
@@ -9,11 +8,11 @@ from __future__ import annotations
 import hashlib
 import re
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
-from quadriga.shared.errors import ConfigError
+from quadriga.shared.errors import ConfigError, name_file_errors
 
 KEY: Final = "team.agent_command"
 # What stands in braces in the command line, and is filled in for each robot; the program finds the
@@ -21,7 +20,6 @@ KEY: Final = "team.agent_command"
 PLACES: Final = ("robot", "team", "config", "endpoint", "mode", "listen")
 ENVIRONMENT: Final = "QUADRIGA_"
 _PLACE: Final = re.compile(r"\{(\w+)\}")
-_DIGITS: Final = 16  # of a digest
 
 
 def parse_line(line: str) -> tuple[str, ...]:
@@ -44,12 +42,7 @@ def parse_line(line: str) -> tuple[str, ...]:
 
 
 def fill_in(words: Sequence[str], places: Mapping[str, str]) -> tuple[str, ...]:
-    """The words with what stands in braces filled in.
-
-    Args:
-        words: of `parse_line`.
-        places: what stands at each of `PLACES`.
-    """
+    """The words with what stands at each of `PLACES` filled in."""
     return tuple(_PLACE.sub(lambda match: places.get(match[1], match[0]), word) for word in words)
 
 
@@ -58,10 +51,11 @@ def environment_of(places: Mapping[str, str]) -> dict[str, str]:
     return {f"{ENVIRONMENT}{name.upper()}": value for name, value in places.items()}
 
 
-def controller_origin(line: str) -> str:
+def command_origin(line: str) -> str:
     """A command line with the digest of all files that it names; "" for the project's own agents.
 
-    The digest has 16 hexadecimal digits. Files that the program opens by itself are not part of it.
+    A file may stand behind an `=`, as in `--weights=FILE`. The digest has 16 hexadecimal digits.
+    Files that the program opens by itself are not part of it.
 
     Raises:
         ConfigError: as `parse_line`, or a file cannot be read.
@@ -69,18 +63,10 @@ def controller_origin(line: str) -> str:
     if not line:
         return ""
     digest = hashlib.sha256()
-    for path in named_files(parse_line(line)):
-        try:
-            content = path.read_bytes()
-        except OSError as error:
-            raise ConfigError(KEY, f"{path}: {error.strerror}", "a file that can be read") from None
-        digest.update(f"\0{path}\0".encode() + content)
-    return f"{line} {digest.hexdigest()[:_DIGITS]}"
-
-
-def named_files(words: Sequence[str]) -> Iterator[Path]:
-    """The files that words of a command line name, also behind an `=` as in `--weights=FILE`."""
-    for word in words:
+    for word in parse_line(line):
         for text in dict.fromkeys((word, word.rpartition("=")[2])):
-            if text and Path(text).is_file():
-                yield Path(text)
+            path = Path(text)
+            if text and path.is_file():
+                with name_file_errors(ConfigError, KEY, "a file that can be read", text):
+                    digest.update(f"\0{path}\0".encode() + path.read_bytes())
+    return f"{line} {digest.hexdigest()[:16]}"
