@@ -9,14 +9,11 @@ from typing import Final
 
 import numpy as np
 
-from quadriga.agents.controller.controller import Controller, ControllerOutputs
-from quadriga.agents.controller.estimator import trunk_from_truth
-from quadriga.agents.controller.foot_load import foot_load_rule
-from quadriga.agents.controller.memory import Memory
-from quadriga.agents.controller.schedule import Schedule
-from quadriga.agents.controller.sensed import Sensed
-from quadriga.agents.controller.whole_body.problem import WholeBodyProblem, WholeBodySolution
+from quadriga.agents.controller.controller import control
+from quadriga.agents.controller.whole_body_qp import WholeBodySolution
 from quadriga.agents.counters import count
+from quadriga.agents.estimator.estimator import estimate, truth_row
+from quadriga.agents.estimator.robot_state import RobotState, Schedule, gains_row
 from quadriga.agents.healing import Healing, may_resume, ramp, step_healing
 from quadriga.agents.modes import (
     DAMPING,
@@ -73,7 +70,7 @@ class AgentState:
     tick: int
     mode: Mode
     planning: PlanningState
-    low_level: Memory | None = None
+    controller_state: RobotState | None = None
     references: tuple[Reference, ...] = ()
     last_tau: Array = field(default_factory=lambda: np.zeros(12))
     failures: int = 0
@@ -91,12 +88,10 @@ class StepProblems:
 
     Attributes:
         whole_body: of the controller.
-        whole_body_solution: its answer.
         planner: of the planning part; None if it solved none.
     """
 
-    whole_body: WholeBodyProblem
-    whole_body_solution: WholeBodySolution
+    whole_body: WholeBodySolution
     planner: SolvedQp | None
 
 
@@ -123,7 +118,7 @@ class Agent:
         self.config = config
         self.robot = robot
         self.index = robot_names(config.team.robots).index(robot)
-        self._controller = Controller(config)
+        self._gains = gains_row(config)
         self._planning = build_planning(config, self.index, predictor, clock_ns, collected)
         self._by_truth = config.estimator.kind == "truth"
         self._stand_ms, self._stance_ms = config.gait.stand_ms, config.gait.stance_ms
@@ -212,15 +207,14 @@ class Agent:
 
     def problems_of(self, state: AgentState, inputs: Inputs) -> StepProblems:
         """The QPs that `step` solves for these arguments, also where a closed form answers them."""
-        _, _, (sensed, planning_inputs, acted) = self._run(state, inputs)
-        whole_body = self._controller.problem(sensed, acted.memory, acted.goal)
+        _, _, (planning_inputs, whole_body) = self._run(state, inputs)
         planner = self._planning.problem_of(state.planning, planning_inputs)
-        return StepProblems(whole_body, acted.solution, planner)
+        return StepProblems(whole_body, planner)
 
     def _run(
         self, state: AgentState, inputs: Inputs
-    ) -> tuple[AgentState, Outputs, tuple[Sensed, PlanningInputs, ControllerOutputs]]:
-        """Sense, plan, act. Each of them sees the mode after the stops that came up before it."""
+    ) -> tuple[AgentState, Outputs, tuple[PlanningInputs, WholeBodySolution]]:
+        """Estimate, plan, control: each sees the mode after the stops that came up before it."""
         tick = inputs.state.tick
         dt = 1e-3 if state.tick < 0 else min(_LONGEST_DT, 1e-3 * (tick - state.tick))
         read = self._validator.step(state.readings, inputs.state, 1e-3 * (tick - state.tick))
@@ -235,12 +229,12 @@ class Agent:
         stops = self._stops_on_arrival(inputs, course, team, led=led)
         mode = resolve_stops(course, tick, stops) if stops else course
         schedule = self._schedules.at(tick, mode)
-        sensed = self._sense(state, inputs, schedule, dt)
-        if not sensed.upright >= self._fallen_cosine:
-            stops.append(Stop(DAMPING, NO_ESTIMATE if math.isnan(sensed.upright) else FALL))
+        robot = self._estimate(state, inputs, schedule, dt)
+        if not robot.upright >= self._fallen_cosine:
+            stops.append(Stop(DAMPING, NO_ESTIMATE if math.isnan(robot.upright) else FALL))
             mode = resolve_stops(course, tick, stops)
 
-        measurement = self._sample_measurement(state, tick, sensed)
+        measurement = self._sample_measurement(state, tick, robot)
         asked = PlanningInputs(tick, mode, followed, measurement, inputs.measurements, inputs.plans)
         planning, planned = self._planning.step(state.planning, asked)
         if planned.stop_reason:
@@ -248,10 +242,10 @@ class Agent:
             mode = resolve_stops(course, tick, stops)
 
         setpoint = setpoint_at(planning.plans, tick)
-        task = self._tasks.build(tick, mode, reference, setpoint, inputs.excitation)
+        command = self._tasks.build(tick, mode, reference, setpoint, inputs.excitation)
         new_sample = tick // SAMPLE_MS != state.tick // SAMPLE_MS
-        acted = self._controller.act(sensed, schedule, task, dt, new_sample=new_sample)
-        solution, failures = acted.solution, 0
+        controlled, solution = control(robot, command, self._gains, new_sample=new_sample)
+        failures = 0
         if not solution.solved:
             failures = state.failures + 1
             if failures >= self._max_failures:
@@ -260,18 +254,18 @@ class Agent:
 
         tau = solution.tau if not failures else state.last_tau  # the QP's, or the last good ones
         if mode.name == STAND and not read.complete:
-            since, command = self._validator.stand(state.standing_since, read)
+            since, motors = self._validator.stand(state.standing_since, read)
         else:
-            since, command = None, self._command(tick, tau, mode, solved=not failures)
+            since, motors = None, self._command(tick, tau, mode, solved=not failures)
         counters = count(state.counters, planned, solution, read)
         ages = {"reference": float(reference_age), **planned.ages_ms}
         said = (measurement, planned.plan, mode.name, mode.reason, counters, ages)
-        outputs = Outputs(command, *said, planned.planner_ns)
+        outputs = Outputs(motors, *said, planned.planner_ns)
         whole = led and read.complete and self._is_whole(tick, mode, team, planning)
         healing = self._heal(healing, mode, inputs, whole=whole)
         after = (references, tau, failures, counters, healing, team, None, read.memory, since)
-        new = AgentState(tick, mode, planning, acted.memory, *after)
-        return new, outputs, (sensed, asked, acted)
+        new = AgentState(tick, mode, planning, controlled, *after)
+        return new, outputs, (asked, solution)
 
     def _stops_on_arrival(
         self, inputs: Inputs, course: Mode, team: Teammates, *, led: bool
@@ -322,22 +316,17 @@ class Agent:
             return Mode(WALK, tick), replace(healing, resumed=tick)
         return step_mode(mode, tick, stand_ms, ends), healing
 
-    def _sense(self, state: AgentState, inputs: Inputs, schedule: Schedule, dt: float) -> Sensed:
-        truth = inputs.truth
+    def _estimate(
+        self, state: AgentState, inputs: Inputs, schedule: Schedule, dt: float
+    ) -> RobotState:
+        truth, known = inputs.truth, None
         # One that is lost or late is bridged by the filter.
         if self._by_truth and truth is not None and inputs.state.tick - truth.tick <= _TRUTH_AGE_MS:
-            estimate = trunk_from_truth(
-                truth,
-                self.robot,
-                inputs.state,
-                self.config.robot.geometry,
-                foot_load_rule(self.config),
-            )
-            return self._controller.place(state.low_level, estimate, schedule, dt)
-        return self._controller.sense(state.low_level, inputs.state, schedule, dt)
+            known = truth_row(truth, self.robot)
+        return estimate(state.controller_state, inputs.state, schedule, dt, self._gains, known)
 
     def _sample_measurement(
-        self, state: AgentState, tick: int, sensed: Sensed
+        self, state: AgentState, tick: int, robot: RobotState
     ) -> Measurement | None:
         """The 100 Hz sample that ends at `tick`: mean planned force, outputs at its last tick.
 
@@ -351,7 +340,7 @@ class Agent:
         if tick % SAMPLE_MS or begun < 0 or begun > state.tick:
             return None
         stance = self._schedules.at(begun, state.mode).stance
-        return Measurement(tick, tick * 1_000_000, sensed.memory.mean_force, sensed.outputs, stance)
+        return Measurement(tick, tick * 1_000_000, robot.mean_planned_force, robot.outputs, stance)
 
     def _command(self, tick: int, tau: Array, mode: Mode, *, solved: bool) -> Command:
         """The motor command: torques, with damping where they are not this tick's, or damping."""

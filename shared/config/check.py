@@ -45,7 +45,6 @@ def check(config: Config) -> None:
     _check_gait(config.gait)
     _check_world(config.world, robot_names(config.team.robots))
     _check_motors(config.motors)
-    _check_foot_sensors(config)
     _check_planner(config.planner, config.world)
     _check_plants(config)
     _check_controller(config)
@@ -106,18 +105,6 @@ def _check_motors(motors: MotorsConfig) -> None:
             f"false with joint friction of {friction:g}",
             "true, or motors.friction = 0 and motors.viscous_friction = 0",
             "friction of light joints turns their rates around at every tick",
-        )
-
-
-def _check_foot_sensors(config: Config) -> None:
-    """Feet that give counts, as those of real robots do, are not taken for such that measure N."""
-    simulated = config.team.plant == SIMULATED and config.sensors.foot_sensor != "newtons"
-    if config.controller.foot_load == "sensor" and (simulated or config.team.plant == BRIDGED):
-        raise ConfigError(
-            "controller.foot_load",
-            "'sensor' with feet that give counts",
-            "'fused', or simulated robots with sensors.foot_sensor = 'newtons'",
-            "counts of unknown scale and bias would be taken for N",
         )
 
 

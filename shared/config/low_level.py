@@ -33,9 +33,7 @@ class EstimatorConfig:
         low=0.0,
         high=1e4,
     )
-    contact_force: float = key(
-        10.0, "N", "a foot with less load is not trusted", low=0.0, high=200.0
-    )
+    trust_force: float = key(10.0, "N", "a foot with less load is not trusted", low=0.0, high=200.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,13 +129,6 @@ class ControllerConfig:
     kp_swing: float = key(400.0, "1/s²", "swing foot", low=0.0, high=1e4)
     kd_swing: float = key(40.0, "1/s", "swing foot rate", low=0.0, high=1e3)
     contact_detection: bool = key(True, "-", "early touchdown becomes stance, a lost foot descends")
-    foot_load: str = key(
-        "fused",
-        "-",
-        "what feet bear. fused: by the joints' torques, and by foot sensors as far as they agree "
-        "with those; sensor: by foot sensors alone, which must measure N",
-        choices=("fused", "sensor"),
-    )
     contact_force: float = key(
         4.0, "N", "load by a foot sensor that counts as contact", low=0.5, high=100.0
     )
@@ -164,13 +155,6 @@ class ControllerConfig:
         True,
         "-",
         "a foot stopped from the side is no contact, nor one that landed early and bears no load",
-    )
-    liftoff_hold_ms: int = key(
-        0,
-        "ms",
-        "longest time that lift-off waits for contact of the feet that are to stand; 0: none",
-        low=0,
-        high=1000,
     )
     reflex_ms: int = key(
         10,

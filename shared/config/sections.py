@@ -80,8 +80,7 @@ class Config:
     @property
     def feet_measure_newtons(self) -> bool:
         """Whether foot forces of messages are N, and not counts of unknown scale and bias."""
-        simulated = self.team.plant == SIMULATED and self.sensors.foot_sensor == "newtons"
-        return simulated or self.controller.foot_load == "sensor"
+        return self.team.plant == SIMULATED and self.sensors.foot_sensor == "newtons"
 
     @property
     def response_file(self) -> str:
