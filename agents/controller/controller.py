@@ -14,7 +14,12 @@ import numpy as np
 
 from quadriga.agents.controller.rigid_body import rigid_body_terms
 from quadriga.agents.controller.swing import foot_velocities, stance_forces, swing_accelerations
-from quadriga.agents.controller.trunk import COMMAND, TrunkCommand, trunk_reference
+from quadriga.agents.controller.trunk import (
+    COMMAND,
+    TrunkCommand,
+    accumulate_forces,
+    trunk_reference,
+)
 from quadriga.agents.controller.whole_body_qp import (
     QP,
     WholeBodySolution,
@@ -65,7 +70,8 @@ def _control(before: Array, after: Array, command_row: Array, gains_row: Array, 
     command = command_row.view(COMMAND)[0]
     terms = rigid_body_terms(state.q, state.v, add_payload(gains.links, state.payload))
 
-    deviation, state.acc_des[:] = trunk_reference(state, command, gains)
+    deviation = accumulate_forces(state, command, gains.weight)
+    state.acc_des[:] = trunk_reference(state, command, gains, deviation)
     state.v_foot[:] = foot_velocities(terms.J, state.v, state.p_foot)
     update_mu_reduction(state, gains)
     state.swing_acc_des[:] = swing_accelerations(state, command.wz, gains)

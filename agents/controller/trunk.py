@@ -64,17 +64,17 @@ class TrunkCommand:
 
 
 @compiled
-def trunk_reference(state: np.record, command: np.record, gains: np.record) -> tuple[Array, Array]:
-    """The planned deviation, see `accumulate_forces`, and the desired acceleration of the trunk.
-
-    The latter is linear and angular, (6,), m/s² and rad/s², odometry frame.
+def trunk_reference(
+    state: np.record, command: np.record, gains: np.record, deviation: Array
+) -> Array:
+    """Desired acceleration of the trunk, (6,), m/s² and rad/s², odometry frame.
 
     Args:
         state: `ROBOT_STATE`; integrators and the desired heading go on.
         command: `COMMAND`.
         gains: `GAINS`.
+        deviation: see `accumulate_forces`.
     """
-    deviation = accumulate_forces(state, command, gains.weight)
     keep_heading(state)
     acc = trunk_feedback(state, command, gains)
     if command.feedforward > 0.5:
@@ -84,7 +84,7 @@ def trunk_reference(state: np.record, command: np.record, gains: np.record) -> t
         # to move the trunk a little, and the feet are not where the ground will be.
         acc[:] = 0.0
         acc[2] = -GRAVITY
-    return deviation, acc
+    return acc
 
 
 @compiled
@@ -140,12 +140,8 @@ def keep_heading(state: np.record) -> None:
 @compiled
 def trunk_feedback(state: np.record, command: np.record, gains: np.record) -> Array:
     """Accelerations that bring the outputs to their reference, (6,), odometry frame."""
-    rpy, velocity, omega, dt = (
-        roll_pitch_yaw(state.R),
-        state.velocity,
-        state.R @ state.omega,
-        state.dt,
-    )
+    rpy, omega = roll_pitch_yaw(state.R), state.R @ state.omega
+    velocity, dt = state.velocity, state.dt
     c, s = np.cos(rpy[2]), np.sin(rpy[2])
     acc, in_plane = np.empty(6), np.empty(2)
 
@@ -158,11 +154,8 @@ def trunk_feedback(state: np.record, command: np.record, gains: np.record) -> Ar
     error = command.v - np.array(
         [c * velocity[0] + s * velocity[1], -s * velocity[0] + c * velocity[1]]
     )
-    integral, position, limit = (
-        state.speed_integral,
-        state.position_error,
-        gains.position_error_limit,
-    )
+    integral, position = state.speed_integral, state.position_error
+    limit = gains.position_error_limit
     for axis in range(2):
         remaining = (1.0 - dt / gains.leak_xy) * integral[axis]
         integral[axis] = min(_SPEED_LIMIT, max(-_SPEED_LIMIT, remaining + dt * error[axis]))

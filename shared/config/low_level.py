@@ -199,7 +199,7 @@ class ControllerConfig:
         0.1,
         "m",
         "how far a foothold may lie from under where its hip is now towards the middle line; times "
-        "1 + load / mass with a load that is felt",
+        "1 + load / mass with an estimated load",
         low=0.0,
         high=10.0,
     )

@@ -36,13 +36,6 @@ class Feet:
         return state
 
 
-def test_standing_feet_are_contacts_on_level_ground() -> None:
-    state = Feet().run(100, ALL, 0.5, -1)
-    np.testing.assert_array_equal(state.contact, ALL)
-    np.testing.assert_allclose(state.ground, 0.0, atol=1e-15)
-    assert abs(state.ground_height) < 1e-15
-
-
 @pytest.mark.parametrize("patience_ms", [1, 5, 20])
 def test_a_stance_foot_without_load_is_taken_out_after_its_patience(patience_ms: int) -> None:
     feet = Feet(lost_contact_ms=patience_ms)
@@ -158,9 +151,3 @@ def test_the_plain_setting_follows_the_schedule_and_filters_the_ground_height() 
         assert state.ground_height == pytest.approx(rise * (1.0 - (1.0 - rate) ** k), rel=1e-9)
     np.testing.assert_array_equal(state.contact, PAIR)
     np.testing.assert_array_equal(feet.run(1, OTHER, 0.0, 1).contact, OTHER)
-
-
-def test_a_filter_of_no_time_follows_at_once() -> None:
-    feet = Feet(ground_filter_ms=0.0)
-    feet.z += 0.01
-    assert feet.run(1, ALL, 0.5, -1).ground_height == pytest.approx(0.01)

@@ -89,18 +89,6 @@ def dead(_: int, noise: Array, load: Array) -> Array:
     return np.rint(50.0 + noise)
 
 
-def held(ticks: int) -> Sensor:
-    """A sensor that measures every so many ticks, and repeats what it read in between."""
-    last = np.zeros(N_LEGS)
-
-    def measure(tick: int, noise: Array, load: Array) -> Array:
-        if tick % ticks == 0:
-            last[:] = raw(tick, 0.05 * noise, load)
-        return last
-
-    return measure
-
-
 def settled(ticks: int) -> Flags:
     """Ticks at which no load has just begun or ended."""
     phase = np.arange(ticks) % HALF_CYCLE
@@ -172,18 +160,6 @@ def test_a_sensor_counts_again_once_it_has_drifted() -> None:
     load, estimated, _ = trot.run(400)
     # The drift of one second is not known yet, of the least sensitive one 6 N; the rest is noise.
     assert np.abs(estimated - load)[settled(400)].max() < 6.0 + 5.0
-
-
-def test_counts_that_are_held_make_no_load_worse() -> None:
-    """Without a sensor, with counts held for 21 ms, with new ones at every tick."""
-    errors = []
-    for sensor in (absent, held(21), held(1)):
-        trot = Trot(sensor)
-        trot.run(800)
-        load, estimated, _ = trot.run(1600)
-        errors.append(np.sqrt(np.mean((estimated - load) ** 2)))
-    assert errors[1] < errors[0]
-    assert errors[2] < 0.5 * errors[0]
 
 
 def test_counts_of_a_real_go1_help_although_they_are_held() -> None:

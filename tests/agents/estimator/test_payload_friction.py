@@ -150,7 +150,3 @@ def test_friction_below_the_least_counts_where_forces_of_sliding_feet_show_it(
 ) -> None:
     assert reduction_after(500, moving(0, 2.0), mu=mu) == pytest.approx(MU - counted_on)
     assert reduction_after(500, REST, 0.1, mu=mu) == pytest.approx(0.1 - 0.5 * RECOVERY)
-
-
-def test_a_slip_on_better_ground_does_not_raise_what_is_counted_on() -> None:
-    assert reduction_after(100, moving(0, 2.0), MU - 0.15, mu=0.8) == pytest.approx(MU - 0.15)
