@@ -15,7 +15,7 @@ answers where no limit is active, else an active set (DAQP).
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import Final
 
 import daqp
 import numpy as np
@@ -169,14 +169,17 @@ def build_qp(
     """
     qp = row.view(QP)[0]
     qp.contact[:] = state.contact
-    on, off = _split_feet(terms, state)
-    affine, acceleration = _resolve_contacts(terms, on)
-    outputs = _output_dynamics(terms.v, state.R, acceleration, off, state.acc_des)
+    J, drift = _foot_jacobians(terms, state.p_foot)
+    stands = np.repeat(state.contact > 0.5, 3)
+    on, off = np.flatnonzero(stands), np.flatnonzero(~stands)
+    affine, acceleration = _resolve_contacts(terms, J[on], drift[on])
+    swing = drift[off] - state.swing_acc_des.ravel()[off]
+    outputs = _output_dynamics(terms.v, state, acceleration, J[off], swing)
     forces, rows = len(affine), len(outputs)
     qp.A[:forces], qp.a0[:forces] = affine[:, :12], affine[:, 12]
     qp.B[:rows], qp.defect0[:rows] = outputs[:, :12], outputs[:, 12]
     qp.lower[:12], qp.upper[:12], qp.upper[12:] = bounds[0], bounds[1], _UNBOUNDED
-    _fill_cost(qp, outputs, on.desired, gains)
+    _fill_cost(qp, outputs, state.force_des.ravel()[on], gains)
     _fill_friction_cone(qp, forces // 3, gains.mu - state.mu_reduction, gains.force_min)
     step = np.negative(qp.g).reshape(12, 1)
     cholesky_solve(cholesky(qp.H), step)
@@ -191,67 +194,31 @@ def build_qp(
     return True
 
 
-class StackedFeet(NamedTuple):
-    """Some of the feet, their coordinates one behind the other, 3 n in all.
-
-    Attributes:
-        J: Jacobian of their centres, (3 n, 18), odometry frame.
-        drift: J̇ v, (3 n,), m/s².
-        desired: forces of feet in contact, N, accelerations of the others, m/s², (3 n,).
-    """
-
-    J: Array
-    drift: Array
-    desired: Array
-
-
 @compiled
-def _split_feet(terms: RigidBodyTerms, state: np.record) -> tuple[StackedFeet, StackedFeet]:
-    """The feet in contact and the others."""
-    n_on = 0
-    for leg in range(4):
-        if state.contact[leg] > 0.5:
-            n_on += 3
-    n_off = 12 - n_on
-    on = StackedFeet(np.zeros((n_on, 18)), np.zeros(n_on), np.zeros(n_on))
-    off = StackedFeet(np.zeros((n_off, 18)), np.zeros(n_off), np.zeros(n_off))
-    i_on, i_off = 0, 0
-    for leg in range(4):
-        if state.contact[leg] > 0.5:
-            rows = slice(i_on, i_on + 3)
-            _fill_jacobian(terms, state.p_foot[leg], leg, on.J[rows], on.drift[rows])
-            on.desired[rows] = state.force_des[leg]
-            i_on += 3
-        else:
-            rows = slice(i_off, i_off + 3)
-            _fill_jacobian(terms, state.p_foot[leg], leg, off.J[rows], off.drift[rows])
-            off.desired[rows] = state.swing_acc_des[leg]
-            i_off += 3
-    return on, off
-
-
-@compiled
-def _fill_jacobian(
-    terms: RigidBodyTerms, p: Array, leg: int, jacobian: Array, drift: Array
-) -> None:
-    """Fill the Jacobian (3, 18) and drift J̇v (3,) of one foot's centre at p, odometry frame."""
+def _foot_jacobians(terms: RigidBodyTerms, p_foot: Array) -> tuple[Array, Array]:
+    """Jacobian of the foot centres, (12, 18), and its drift J̇v, (12,), odometry frame."""
     J, dJ, v = terms.J, terms.dJ, terms.v
-    bias, twist = np.zeros(6), np.zeros(6)
-    for k in range(9):
-        column = k if k < 6 else 3 * leg + k
-        w = J[3:6, column]
-        jacobian[0, column] = J[0, column] + w[1] * p[2] - w[2] * p[1]
-        jacobian[1, column] = J[1, column] + w[2] * p[0] - w[0] * p[2]
-        jacobian[2, column] = J[2, column] + w[0] * p[1] - w[1] * p[0]
-        for row in range(6):
-            bias[row] += dJ[row, column] * v[column]
-            twist[row] += J[row, column] * v[column]
-    velocity = twist[:3] + cross(twist[3:], p)
-    drift[:] = bias[:3] + cross(bias[3:], p) + cross(twist[3:], velocity)
+    jacobian, drift = np.zeros((12, 18)), np.empty(12)
+    for leg in range(4):
+        p, row = p_foot[leg], 3 * leg
+        bias, twist = np.zeros(6), np.zeros(6)
+        for k in range(9):
+            column = k if k < 6 else 3 * leg + k
+            w = J[3:6, column]
+            jacobian[row, column] = J[0, column] + w[1] * p[2] - w[2] * p[1]
+            jacobian[row + 1, column] = J[1, column] + w[2] * p[0] - w[0] * p[2]
+            jacobian[row + 2, column] = J[2, column] + w[0] * p[1] - w[1] * p[0]
+            for i in range(6):
+                bias[i] += dJ[i, column] * v[column]
+                twist[i] += J[i, column] * v[column]
+        velocity = twist[:3] + cross(twist[3:], p)
+        acceleration = bias[:3] + cross(bias[3:], p) + cross(twist[3:], velocity)
+        drift[row : row + 3] = acceleration
+    return jacobian, drift
 
 
 @compiled
-def _resolve_contacts(terms: RigidBodyTerms, feet: StackedFeet) -> tuple[Array, Array]:
+def _resolve_contacts(terms: RigidBodyTerms, J_c: Array, drift: Array) -> tuple[Array, Array]:
     """Contact forces and accelerations as functions of the torques where the feet do not slip.
 
     v̇ = M⁻¹ (S τ + J_cᵀ f − h) with J_c v̇ + J̇_c v = 0 gives f = A τ + a₀.
@@ -259,13 +226,12 @@ def _resolve_contacts(terms: RigidBodyTerms, feet: StackedFeet) -> tuple[Array, 
     Returns:
         (A, a₀), (3 n_c, 13), and v̇ of each torque and of none, (18, 13).
     """
-    M_inverse, J_c = terms.M_inverse, feet.J
-    n = len(J_c)
+    M_inverse, n = terms.M_inverse, len(J_c)
     free = times(M_inverse, terms.nle)
     J_c_M_inverse = product(J_c, M_inverse)  # its transpose is M⁻¹ J_cᵀ, M being symmetric
     affine = np.empty((n, 13))
     affine[:, :12] = -J_c_M_inverse[:, 6:]
-    affine[:, 12] = times(J_c, free) - feet.drift
+    affine[:, 12] = times(J_c, free) - drift
     Lambda_inverse = np.empty((n, n))
     for i in range(n):
         for j in range(i + 1):
@@ -284,27 +250,27 @@ def _resolve_contacts(terms: RigidBodyTerms, feet: StackedFeet) -> tuple[Array, 
 
 @compiled
 def _output_dynamics(
-    v: Array, R: Array, acceleration: Array, feet: StackedFeet, acc_des: Array
+    v: Array, state: np.record, acceleration: Array, J_swing: Array, swing: Array
 ) -> Array:
     """The outputs' accelerations of each torque, and of none less the desired ones.
 
     Args:
         v: generalised velocity, (18,).
-        R: trunk to odometry frame, (3, 3).
+        state: `ROBOT_STATE`.
         acceleration: v̇ of each torque and of none, (18, 13).
-        feet: those not in contact.
-        acc_des: desired acceleration of the trunk, (6,).
+        J_swing: Jacobian of the feet not in contact, (12 − 3 n_c, 18).
+        swing: their drift J̇ v less the desired acceleration, (12 − 3 n_c,).
 
     Returns:
         (B, b₀ − a_des), (18 − 3 n_c, 13).
     """
-    outputs = np.empty((6 + len(feet.J), 13))
+    R, outputs = state.R, np.empty((6 + len(J_swing), 13))
     outputs[:3] = product(R, acceleration[:3])
     outputs[3:6] = product(R, acceleration[3:6])
-    outputs[6:] = product(feet.J, acceleration)
-    outputs[:3, 12] += times(R, cross(v[3:6], v[:3])) - acc_des[:3]
-    outputs[3:6, 12] -= acc_des[3:]
-    outputs[6:, 12] += feet.drift - feet.desired
+    outputs[6:] = product(J_swing, acceleration)
+    outputs[:3, 12] += times(R, cross(v[3:6], v[:3])) - state.acc_des[:3]
+    outputs[3:6, 12] -= state.acc_des[3:]
+    outputs[6:, 12] += swing
     return outputs
 
 

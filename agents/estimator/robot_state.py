@@ -100,10 +100,10 @@ ROBOT_STATE: Final = np.dtype(
             ("yaw_drift", float),  # of the IMU by the last long stand, rad/s
             ("force_sum", float, N_FORCES),  # of the planned forces in this sample, N, yaw frame
             ("force_count", float),  # ticks of it
-            # What the whole-body QP was asked for, see `WbcReference`.
-            ("acc_des", float, 6),
-            ("swing_acc_des", float, (N_LEGS, 3)),
-            ("force_des", float, (N_LEGS, 3)),
+            # What the whole-body QP is asked for, odometry.
+            ("acc_des", float, 6),  # of the trunk, linear and angular, m/s², rad/s²
+            ("swing_acc_des", float, (N_LEGS, 3)),  # of the feet not in contact, m/s²
+            ("force_des", float, (N_LEGS, 3)),  # contact forces, N
         ],
     )
 )

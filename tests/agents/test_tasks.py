@@ -10,6 +10,7 @@ import pytest
 
 from quadriga.agents import agent as agent_module
 from quadriga.agents.agent import Outputs
+from quadriga.agents.controller.controller import control
 from quadriga.agents.controller.trunk import TrunkCommand
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.config.sections import Config, TeamConfig
@@ -30,7 +31,6 @@ class Watched:
         self.rollout = Rollout(self.config, predictor, every_100_ms)
         self.asked: list[tuple[int, TrunkCommand, Plan]] = []
         self._plan: Plan | None = None
-        control = agent_module.control
 
         def seen(state: Any, command: TrunkCommand, gains: Array, **named: Any) -> Any:
             self._tasks.append(command)
