@@ -128,5 +128,7 @@ def _timed(name: str, watch: _Stopwatch) -> Iterator[None]:
         return result
 
     setattr(agent_module, name, run)
-    yield
-    setattr(agent_module, name, function)
+    try:
+        yield
+    finally:
+        setattr(agent_module, name, function)
