@@ -12,14 +12,11 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from quadriga.agents.controller.controller import Controller, ControllerOutputs
-from quadriga.agents.controller.estimator import trunk_from_truth
-from quadriga.agents.controller.foot_load import foot_load_rule
-from quadriga.agents.controller.memory import Memory
-from quadriga.agents.controller.schedule import Schedule
-from quadriga.agents.controller.sensed import Sensed
-from quadriga.agents.controller.whole_body.problem import WholeBodyProblem, WholeBodySolution
+from quadriga.agents.controller.controller import control
+from quadriga.agents.controller.whole_body_qp import WholeBodySolution
 from quadriga.agents.counters import count
+from quadriga.agents.estimator.estimator import estimate, truth_row
+from quadriga.agents.estimator.robot_state import RobotState, Schedule, gains_row
 from quadriga.agents.modes import ModeRules, Resume, Statuses, newest_statuses, ramp
 from quadriga.agents.planner.qp_solver import SolvedQp
 from quadriga.agents.planner.team_planner import Collected
@@ -67,7 +64,7 @@ class AgentState:
     tick: int
     mode: Mode
     planning: PlanningState
-    low_level: Memory | None = None
+    controller_state: RobotState | None = None
     references: tuple[Reference, ...] = ()
     last_tau: Array = field(default_factory=lambda: np.zeros(12))
     failures: int = 0
@@ -85,12 +82,10 @@ class StepProblems:
 
     Attributes:
         whole_body: of the controller.
-        whole_body_solution: its answer.
         planner: of the planning part; None if it solved none.
     """
 
-    whole_body: WholeBodyProblem
-    whole_body_solution: WholeBodySolution
+    whole_body: WholeBodySolution
     planner: SolvedQp | None
 
 
@@ -99,9 +94,8 @@ class _Tick(NamedTuple):
 
     state: AgentState
     outputs: Outputs
-    sensed: Sensed
     asked: PlanningInputs
-    acted: ControllerOutputs
+    whole_body: WholeBodySolution
 
 
 class Agent:
@@ -127,7 +121,7 @@ class Agent:
         self.config = config
         self.robot = robot
         self.index = robot_names(config.team.robots).index(robot)
-        self._controller = Controller(config)
+        self._gains = gains_row(config)
         self._planning = build_planning(config, self.index, predictor, clock_ns, collected)
         self._by_truth = config.estimator.kind == "truth"
         self._height = config.reference.height
@@ -166,9 +160,8 @@ class Agent:
     def problems_of(self, state: AgentState, inputs: Inputs) -> StepProblems:
         """The QPs that `step` solves for these arguments, also where a closed form answers them."""
         tick = self._tick(state, inputs)
-        whole_body = self._controller.problem(tick.sensed, tick.acted.memory, tick.acted.goal)
         planner = self._planning.problem_of(state.planning, tick.asked)
-        return StepProblems(whole_body, tick.acted.solution, planner)
+        return StepProblems(tick.whole_body, planner)
 
     def stands_up(self, state: AgentState, inputs: Inputs) -> bool:
         """Whether the robot, which was damped, stands up in the step of these arguments."""
@@ -191,28 +184,27 @@ class Agent:
             stops.append(Stop(STAND, read.lost))
 
         schedule = self._schedules.at(tick, mode)
-        sensed = self._sense(state, inputs, schedule, dt)
-        if not sensed.upright >= self._fallen_cosine:
-            stops.append(Stop(PASSIVE, NO_ESTIMATE if math.isnan(sensed.upright) else FALL))
+        robot = self._estimate(state, inputs, schedule, dt)
+        if not robot.upright >= self._fallen_cosine:
+            stops.append(Stop(PASSIVE, NO_ESTIMATE if math.isnan(robot.upright) else FALL))
 
-        measurement = self._sample_measurement(state, tick, sensed)
+        measurement = self._sample_measurement(state, tick, robot)
         asked = PlanningInputs(tick, mode, followed, measurement, inputs.measurements, inputs.plans)
         planning, planned = self._planning.step(state.planning, asked)
         if planned.stop_reason:
             stops.append(Stop(STOPPING, planned.stop_reason))
 
         setpoint = setpoint_at(planning.plans, tick)
-        task = self._tasks.build(tick, mode, reference, setpoint, inputs.excitation)
+        trunk = self._tasks.build(tick, mode, reference, setpoint, inputs.excitation)
         new_sample = tick // SAMPLE_MS != state.tick // SAMPLE_MS
-        acted = self._controller.act(sensed, schedule, task, dt, new_sample=new_sample)
-        solved = acted.solution.solved
-        failures = 0 if solved else state.failures + 1
+        controlled, solution = control(robot, trunk, self._gains, new_sample=new_sample)
+        failures = 0 if solution.solved else state.failures + 1
         if failures >= self._max_failures:
-            stops.append(Stop(PASSIVE, f"qp-{acted.solution.status}"))
+            stops.append(Stop(PASSIVE, f"qp-{solution.status}"))
 
         mode = resolve_stops(mode, tick, stops)
-        tau = acted.solution.tau if solved else state.last_tau  # the QP's, or the last good ones
-        standing_since, command = None, self._command(tick, tau, mode, solved=solved)
+        tau = state.last_tau if failures else solution.tau  # the QP's, or the last good ones
+        standing_since, command = None, self._command(tick, tau, mode, solved=not failures)
         if mode.name == STAND and not read.complete:
             standing_since, command = self._validator.stand(state.standing_since, read)
 
@@ -228,11 +220,11 @@ class Agent:
             tick,
             mode,
             planning,
-            low_level=acted.memory,
+            controller_state=controlled,
             references=references,
             last_tau=tau,
             failures=failures,
-            counters=count(state.counters, planned, acted.solution, read),
+            counters=count(state.counters, planned, solution, read),
             resume=self._modes.remember(resume, mode, inputs, inputs_ok=inputs_ok),
             statuses=statuses,
             readings=read.memory,
@@ -248,7 +240,7 @@ class Agent:
             {"reference": float(reference_age), **planned.ages_ms},
             planned.planner_ns,
         )
-        return _Tick(new, outputs, sensed, asked, acted)
+        return _Tick(new, outputs, asked, solution)
 
     def _step_of_standing_up(self, state: AgentState, inputs: Inputs) -> tuple[AgentState, Outputs]:
         """Stand up by a tick: nothing is estimated or planned before the robot stands."""
@@ -274,22 +266,17 @@ class Agent:
         outputs = Outputs(command, None, None, mode.name, mode.reason, state.counters, {}, None)
         return new, outputs
 
-    def _sense(self, state: AgentState, inputs: Inputs, schedule: Schedule, dt: float) -> Sensed:
-        truth = inputs.truth
+    def _estimate(
+        self, state: AgentState, inputs: Inputs, schedule: Schedule, dt: float
+    ) -> RobotState:
+        truth, known = inputs.truth, None
         # One that is lost or late is bridged by the filter.
         if self._by_truth and truth is not None and inputs.state.tick - truth.tick <= _TRUTH_AGE_MS:
-            estimate = trunk_from_truth(
-                truth,
-                self.robot,
-                inputs.state,
-                self.config.robot.geometry,
-                foot_load_rule(self.config),
-            )
-            return self._controller.place(state.low_level, estimate, schedule, dt)
-        return self._controller.sense(state.low_level, inputs.state, schedule, dt)
+            known = truth_row(truth, self.robot)
+        return estimate(state.controller_state, inputs.state, schedule, dt, self._gains, known)
 
     def _sample_measurement(
-        self, state: AgentState, tick: int, sensed: Sensed
+        self, state: AgentState, tick: int, robot: RobotState
     ) -> Measurement | None:
         """The 100 Hz sample that ends at `tick`: mean planned force, outputs at its last tick.
 
@@ -303,7 +290,7 @@ class Agent:
         if tick % SAMPLE_MS or begun < 0 or begun > state.tick:
             return None
         stance = self._schedules.at(begun, state.mode).stance
-        return Measurement(tick, tick * 1_000_000, sensed.memory.mean_force, sensed.outputs, stance)
+        return Measurement(tick, tick * 1_000_000, robot.mean_planned_force, robot.outputs, stance)
 
     def _command(self, tick: int, tau: Array, mode: Mode, *, solved: bool) -> Command:
         """The motor command: torques, with damping where they are not this tick's, or damping."""

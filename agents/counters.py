@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from quadriga.agents.controller.whole_body.problem import UNCONSTRAINED, WholeBodySolution
+from quadriga.agents.controller.whole_body_qp import UNCONSTRAINED, WholeBodySolution
 from quadriga.agents.planner.qp_solver import SOLVED
 from quadriga.agents.planning.interface import PlanningOutputs
 from quadriga.agents.validate import Validated

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from quadriga.agents.controller.schedule import Schedule
+from quadriga.agents.estimator.robot_state import Schedule
 from quadriga.agents.gait import half_cycle_stance, stance_progress
 from quadriga.shared.config.sections import Config
 from quadriga.shared.modes import STOPPING, WALK, Mode

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from quadriga.agents.controller.controller import Task
+from quadriga.agents.controller.trunk import TrunkCommand
 from quadriga.agents.planning.active_plan import Setpoint
 from quadriga.shared.config.sections import Config
 from quadriga.shared.messages import Reference
@@ -33,7 +33,7 @@ class Tasks:
         reference: Reference,
         setpoint: Setpoint,
         excitation: Array | None,
-    ) -> Task:
+    ) -> TrunkCommand:
         """The task of one tick.
 
         Args:
@@ -55,4 +55,4 @@ class Tasks:
             vx, vy = float(planned[1]), float(planned[2])
             if self._tracks_all:
                 height, _, _, roll, pitch, wz = map(float, planned)
-        return Task(vx, vy, wz, height, deviation, self._feedforward, roll, pitch)
+        return TrunkCommand(vx, vy, wz, height, deviation, self._feedforward, roll, pitch)

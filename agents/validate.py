@@ -15,11 +15,10 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from quadriga.agents.controller.maths.leg_reaction import foot_forces
-from quadriga.agents.controller.maths.rows import places, row_size
+from quadriga.agents.estimator.leg_dynamics import foot_forces
 from quadriga.shared.codes import with_detail
 from quadriga.shared.config.sections import Config
-from quadriga.shared.messages import Command, State
+from quadriga.shared.messages import Command, State, cuts_of
 from quadriga.shared.modes import ENCODER_LOST, IMU_LOST
 from quadriga.shared.robots.conventions import (
     GRAVITY,
@@ -79,9 +78,9 @@ class ValidationLayout(NamedTuple):
     up: int
 
 
-_ROW: Final = ValidationLayout(
-    **places(read=_N_STATE, valid=_N_STATE, agrees=_N_SENSORS, missing=_N_SENSORS, same=1, up=1)
-)
+_SIZES: Final = {"read": _N_STATE, "valid": _N_STATE, "agrees": _N_SENSORS, "missing": _N_SENSORS}
+_SIZE: Final = sum(_SIZES.values()) + 2
+_ROW: Final = ValidationLayout(**cuts_of(_SIZES), same=_SIZE - 2, up=_SIZE - 1)
 
 
 class Validated(NamedTuple):
@@ -198,7 +197,7 @@ def standing_torques(robot: RobotSpec) -> Array:
 
 def _first(row: Array) -> Array:
     """What is remembered before the first tick: nothing is doubted, the trunk is level."""
-    memory = np.zeros(row_size(_ROW))
+    memory = np.zeros(_SIZE)
     memory[_ROW.read] = memory[_ROW.valid] = row
     memory[_ROW.agrees] = AGREES_MS
     memory[_ROW.valid][_QUAT] = 1.0, 0.0, 0.0, 0.0

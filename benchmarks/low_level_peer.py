@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 import tsid
 
-from quadriga.agents.controller.whole_body.problem import Weights
+from quadriga.shared.config.sections import ControllerConfig
 from quadriga.shared.robots.a1 import A1
 from quadriga.shared.robots.conventions import FOOT_FRAMES, Array
 from quadriga.shared.robots.pinocchio_model import build_pinocchio_model
@@ -28,7 +28,7 @@ _POSITION = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
 class Tsid:
     """One A1 with four feet, each of which is a contact or a task at a tick."""
 
-    def __init__(self, weights: Weights) -> None:
+    def __init__(self, weights: ControllerConfig) -> None:
         self._weights = weights
         model = build_pinocchio_model(A1)
         self._robot = tsid.RobotWrapper(model, tsid.FLOATING_BASE_SYSTEM, False)
@@ -75,18 +75,19 @@ class Tsid:
 
     def set(self, case: TsidCase) -> None:
         """References and contacts of a tick."""
-        goal, changed = case.goal, False
-        for leg, standing in enumerate(goal.contact > 0.5):
+        asked, changed = case.state, False
+        for leg, standing in enumerate(asked.contact > 0.5):
             if standing != self._standing[leg]:
                 self._switch(leg, bool(standing), first=self._standing[leg] is None)
                 self._standing[leg], changed = bool(standing), True
             if standing:
-                self._contacts[leg].setForceReference(goal.force[leg])
+                self._contacts[leg].setForceReference(asked.force_des[leg])
             else:
-                self._feet[leg].setReference(_accelerate(np.append(goal.swing[leg], np.zeros(3))))
-        self._trunk.setReference(_accelerate(goal.trunk))
+                swing = np.append(asked.swing_acc_des[leg], np.zeros(3))
+                self._feet[leg].setReference(_accelerate(swing))
+        self._trunk.setReference(_accelerate(asked.acc_des))
         if changed:
-            self._form.computeProblemData(0.0, case.q, case.v)
+            self._form.computeProblemData(0.0, case.state.q, case.state.v)
             self._solver.resize(self._form.nVar, self._form.nEq, self._form.nIn)
 
     def _switch(self, leg: int, standing: bool, *, first: bool) -> None:
@@ -102,7 +103,7 @@ class Tsid:
 
     def solve(self, case: TsidCase) -> None:
         """Solve the problem of a tick with TSID."""
-        problem = self._form.computeProblemData(0.0, case.q, case.v)
+        problem = self._form.computeProblemData(0.0, case.state.q, case.state.v)
         self._solution = self._solver.solve(problem)
 
     def torques(self) -> Array:

@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from quadriga.agents.agent import Agent, AgentState, Inputs, Outputs
-from quadriga.agents.controller.whole_body.problem import Goal
+from quadriga.agents.estimator.robot_state import RobotState
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.codec import encode
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robots.conventions import Array
 from quadriga.team.operator import references_of
 
 
@@ -24,19 +23,9 @@ class AgentTick:
 
 @dataclass(frozen=True, slots=True)
 class TsidCase:
-    """The inputs of the whole-body part at one tick.
+    """The inputs of the whole-body part at one tick: of the state, what was asked of the QP."""
 
-    Attributes:
-        sensed: `Sensed.flat`.
-        q: Pinocchio's configuration, (19,).
-        v: Pinocchio's velocity, (18,).
-        goal: of the QP.
-    """
-
-    sensed: Array
-    q: Array
-    v: Array
-    goal: Goal
+    state: RobotState
 
 
 def record(config: Config, predictor: Predictor | None) -> list[AgentTick]:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -19,15 +20,9 @@ import numpy as np
 from benchmarks.children import result_of
 from benchmarks.low_level_ticks import AgentTick, TsidCase
 from quadriga.agents.agent import Agent
-from quadriga.agents.controller.controller import Controller, ControllerOutputs, Task
-from quadriga.agents.controller.maths.rigid_body import rigid_body_terms
-from quadriga.agents.controller.maths.rows import numbers
-from quadriga.agents.controller.model import RigidBody
-from quadriga.agents.controller.schedule import Schedule
-from quadriga.agents.controller.sensed import Sensed, coordinates_of, feet_of, trunk_of
-from quadriga.agents.controller.whole_body.limited import LIMITED, LIMITED_SIZE
-from quadriga.agents.controller.whole_body.problem import N_WEIGHTS, Goal, Weights
-from quadriga.agents.controller.whole_body.solution import finish, solve_closed_form
+from quadriga.agents.controller.rigid_body import rigid_body_terms
+from quadriga.agents.controller.whole_body_qp import QP, WholeBodySolution, build_qp, solve_qp
+from quadriga.agents.estimator.robot_state import GAINS, ROBOT_STATE, gains_row
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robots.a1 import A1
@@ -40,11 +35,12 @@ from quadriga.shared.runtime.jit import compiled
 def cases(config: Config, predictor: Predictor | None, ticks: list[AgentTick]) -> list[TsidCase]:
     """The whole-body part's inputs at every tick after the stand."""
     agent = Agent(config, "r1", predictor)
-    agent._controller = controller = _RecordingController(config)
-    memory = agent.initial()
+    state, found = agent.initial(), []
     for tick in ticks:
-        memory, _ = agent.step(memory, tick.inputs)
-    return controller.cases[config.gait.stand_ms :]
+        state, _ = agent.step(state, tick.inputs)
+        if state.controller_state is not None:
+            found.append(TsidCase(state.controller_state))
+    return found[config.gait.stand_ms :]
 
 
 def compare(config: Config, cases: list[TsidCase]) -> dict[str, Any] | None:
@@ -66,8 +62,9 @@ def _compare(config: Config, cases: list[TsidCase]) -> dict[str, Any] | None:
     from benchmarks.low_level_peer import Tsid
 
     # TSID gives rotation and translation, and feet and trunk, one weight: so do both here.
-    weights = Controller(config).weights._replace(tilt_length=1.0, swing_weight=1.0)
-    ours, peer = _Ours(weights), Tsid(weights)
+    weights = replace(config.controller, tilt_length=1.0, swing_weight=1.0)
+    motors = replace(config.motors, rotor_inertia=False)
+    ours, peer = _Ours(replace(config, controller=weights, motors=motors)), Tsid(weights)
     times, differences = np.empty((2, len(cases))), []
     with collector_off():
         for case in cases[:20]:
@@ -96,71 +93,32 @@ def _compare(config: Config, cases: list[TsidCase]) -> dict[str, Any] | None:
     }
 
 
-_TORQUE_LIMIT: Final = A1.torque_limit
+_TORQUE_BOUNDS: Final = A1.torque_bounds
 
 
 class _Ours:
-    """Terms, assembly and solution as in `Controller.act`."""
+    """Terms, assembly and solution as in `Controller.control`."""
 
-    def __init__(self, weights: Weights) -> None:
-        self._body, self._weights, self._row = RigidBody(A1), weights, np.array(weights)
-        self._solved = np.zeros(LIMITED_SIZE)
+    def __init__(self, config: Config) -> None:
+        self._gains = gains_row(config)
+        self._solution: WholeBodySolution | None = None
 
     def solve(self, case: TsidCase) -> None:
         """One tick's torques."""
-        goal = case.goal
-        free = _whole_body(
-            case.sensed,
-            self._body.links,
-            goal.contact,
-            goal.trunk,
-            goal.swing,
-            goal.force,
-            self._row,
-            self._solved,
-        )
-        finish(free, self._solved, goal.contact)
+        row = np.empty(QP.itemsize // 8)
+        free = _whole_body(case.state.row, self._gains, row)
+        self._solution = solve_qp(row, free)
 
     def torques(self) -> Array:
         """Of the last tick, (12,), N·m."""
-        return self._solved[LIMITED.x][:12]
+        assert self._solution is not None
+        tau: Array = self._solution.tau
+        return tau
 
 
 @compiled
-def _whole_body(
-    sensed: Array,
-    links: Array,
-    contact: Array,
-    trunk: Array,
-    swing: Array,
-    force: Array,
-    weights: Array,
-    row: Array,
-) -> bool:
-    """Terms and `solve_closed_form`: arrays are cheaper to pass than tuples."""
-    q, v = coordinates_of(sensed)
-    return solve_closed_form(
-        rigid_body_terms(q, v, links),
-        trunk_of(sensed).R,
-        feet_of(sensed),
-        Goal(contact, trunk, swing, force),
-        Weights(*numbers(weights, N_WEIGHTS)),
-        _TORQUE_LIMIT,
-        row,
-    )
-
-
-class _RecordingController(Controller):
-    """A controller that records the inputs of its QP."""
-
-    def __init__(self, config: Config) -> None:
-        super().__init__(config)
-        self.cases: list[TsidCase] = []
-
-    def act(
-        self, sensed: Sensed, schedule: Schedule, task: Task, dt: float, *, new_sample: bool = False
-    ) -> ControllerOutputs:
-        outputs = super().act(sensed, schedule, task, dt, new_sample=new_sample)
-        goal = Goal(*(part.copy() for part in outputs.goal))
-        self.cases.append(TsidCase(sensed.flat.copy(), sensed.q.copy(), sensed.v.copy(), goal))
-        return outputs
+def _whole_body(row: Array, gains_row: Array, qp: Array) -> bool:
+    """Terms and `build_qp`: arrays are cheaper to pass than records."""
+    state, gains = row.view(ROBOT_STATE)[0], gains_row.view(GAINS)[0]
+    terms = rigid_body_terms(state.q, state.v, gains.links)
+    return build_qp(terms, state, gains, _TORQUE_BOUNDS, qp)

@@ -9,12 +9,11 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from quadriga.agents import gait, rehearsal
-from quadriga.agents.controller import estimator
-from quadriga.agents.controller.maths import leg_kinematics as kinematics
-from quadriga.agents.controller.memory import FilterState
+from quadriga.agents.estimator import estimator, kinematics
+from quadriga.agents.estimator.robot_state import RobotState, gains_row
 from quadriga.agents.planner import planner_qp
 from quadriga.agents.planner.planner_qp import PlannerProblem
-from quadriga.shared.config.sections import PlannerConfig
+from quadriga.shared.config.sections import Config, PlannerConfig
 from quadriga.shared.messages import State
 from quadriga.shared.robots import pinocchio_model
 from quadriga.shared.robots.a1 import A1
@@ -26,7 +25,6 @@ TOTAL_MASS: Final = A1.mass
 TORQUE_LIMIT: Final = A1.torque[0]  # the same for all joints
 STAND_HEIGHT: Final = A1.stand_height
 FOOT_RADIUS: Final = GEOMETRY.foot_radius
-BODY: Final = estimator.FilterBody(GEOMETRY, np.array(A1.imu))
 
 
 def q_stand() -> Array:
@@ -44,13 +42,13 @@ def standing(tick: int, lean: float = 0.0) -> State:
     return rehearsal.standing(A1, tick, lean)
 
 
-def standing_filter(state: State) -> FilterState:
-    """See `estimator.standing_filter`."""
-    return estimator.standing_filter(state, A1)
+def standing_state(state: State) -> RobotState:
+    """See `estimator.standing_state`."""
+    return estimator.standing_state(state, gains_row(Config()))
 
 
 def leg_kinematics(q_joint: Array, v_joint: Array) -> tuple[Array, Array, Array]:
-    """See `maths.leg_kinematics`."""
+    """See `kinematics.leg_kinematics`."""
     return kinematics.leg_kinematics(q_joint, v_joint, GEOMETRY)
 
 

@@ -1,91 +1,196 @@
-"""Swing feet: Raibert footholds, minimum jerk in the plane, a Bézier curve in height."""
+"""What each foot is asked for: Raibert footholds, swing curves, retraction, forces in stance."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Final
 
 import numpy as np
 
-from quadriga.agents.controller.maths.rotation import heading
-from quadriga.shared.robots.conventions import Array
+from quadriga.agents.estimator.kinematics import heading
+from quadriga.shared.robots.conventions import GRAVITY, Array
 from quadriga.shared.runtime.jit import compiled
 
-_PLANE_DONE = 0.9  # of swing: the foot comes down vertically
-_PENETRATION = 0.005  # m below the expected ground, so that touchdown is sure
-
-
-class MotionReference(NamedTuple):
-    """How the trunk moves and shall move, as footholds count on it.
-
-    Attributes:
-        v_expected: velocity to be expected until the foot has stood, (3,), m/s, odometry frame.
-        v_des: desired velocity, (3,), m/s, odometry frame.
-        wz: desired yaw rate, rad/s.
-        inwards: how far from under its hip a foothold may lie towards the trunk's middle line, m.
-    """
-
-    v_expected: Array
-    v_des: Array
-    wz: float
-    inwards: float
+_SHORTEST: Final = 0.1  # m, how near to the hip a foot is lifted
+_CLEARANCE: Final = 0.03  # m, how far a foot that was stopped still rises
+_BACK: Final = 0.3  # of the speed at which a foot retracts upwards: away from what stopped it
+_PLANE_DONE: Final = 0.9  # of swing: the foot comes down vertically
+_PENETRATION: Final = 0.005  # m below the expected ground, so that touchdown is sure
 
 
 @compiled
-def foothold(
-    under_hip: tuple[float, float],
-    position: Array,
-    R: Array,
-    motion: MotionReference,
-    remaining: float,
-    stance_time: float,
-    gain: float,
-) -> Array:
-    """Raibert foothold p = p_hip + v·t_remaining + v·T_stance/2 + k (v − v_des). Shape (2,), m.
-
-    v is the expected velocity; the hip's own velocity from the yaw rate is added to it.
+def foot_velocities(J: Array, v: Array, p_foot: Array) -> Array:
+    """Velocities of the foot centres, (4, 3), m/s, odometry frame.
 
     Args:
-        under_hip: point of the trunk under which the foot stands at rest, m, trunk frame.
-        position: of the trunk's origin, (3,), m, odometry frame.
-        R: trunk to odometry frame, (3, 3).
-        motion: of the trunk.
-        remaining: time to touchdown, s.
-        stance_time: T_stance, s.
-        gain: k, s.
+        J: spatial Jacobians, see `RigidBodyTerms`, (6, 18).
+        v: generalised velocity, (18,).
+        p_foot: foot centres, (4, 3), m, odometry frame.
     """
-    x, y = under_hip
-    c, s = heading(R)
-    rx, ry = c * x - s * y, s * x + c * y
-    ahead = remaining + 0.5 * stance_time
-    velocity, v_des, wz, _ = motion
-    out = np.empty(2)
-    out[0] = position[0] + rx + (velocity[0] - wz * ry) * ahead
-    out[1] = position[1] + ry + (velocity[1] + wz * rx) * ahead
-    out[0] += gain * (velocity[0] - v_des[0])
-    out[1] += gain * (velocity[1] - v_des[1])
+    out = np.empty((4, 3))
+    for leg in range(4):
+        twist = np.zeros(6)
+        for k in range(9):
+            column = k if k < 6 else 3 * leg + k
+            for row in range(6):
+                twist[row] += J[row, column] * v[column]
+        p = p_foot[leg]
+        out[leg, 0] = twist[0] + twist[4] * p[2] - twist[5] * p[1]
+        out[leg, 1] = twist[1] + twist[5] * p[0] - twist[3] * p[2]
+        out[leg, 2] = twist[2] + twist[3] * p[1] - twist[4] * p[0]
     return out
 
 
 @compiled
-def limit_inwards(target: Array, y: float, position: Array, R: Array, inwards: float) -> None:
-    """Move a foothold `target`, (2,), m, outwards, unless it is near enough to under its hip.
-
-    A trunk that is thrown aside asks for footholds across its middle line, where other legs are.
+def stance_forces(state: np.record, gains: np.record, deviation: Array) -> Array:
+    """Nominal weight on the feet in contact plus the planned deviation, (4, 3), N, odometry frame.
 
     Args:
-        target: odometry frame; it changes.
-        y: of the point under the hip, m, trunk frame.
-        position: of the trunk's origin, (3,), m, odometry frame.
-        R: trunk to odometry frame, (3, 3).
-        inwards: how far it may be towards the trunk's middle line from under its hip, m.
+        state: `ROBOT_STATE`.
+        gains: `GAINS`.
+        deviation: planned, from the nominal forces, (12,), N, yaw frame.
     """
-    c, s = heading(R)
-    outwards = 1.0 if y > 0.0 else -1.0
-    aside = c * (target[1] - position[1]) - s * (target[0] - position[0]) - y
+    mass, count = gains.body_mass + state.payload, max(1.0, np.sum(state.contact))
+    c, s = heading(state.R)
+    force = np.zeros((4, 3))
+    for leg in range(4):
+        if state.contact[leg] > 0.5:
+            dx, dy, dz = deviation[3 * leg], deviation[3 * leg + 1], deviation[3 * leg + 2]
+            force[leg, 0] = c * dx - s * dy
+            force[leg, 1] = s * dx + c * dy
+            force[leg, 2] = mass * GRAVITY / count + dz
+    return force
+
+
+@compiled
+def swing_accelerations(state: np.record, wz: float, gains: np.record) -> Array:
+    """Desired accelerations of the feet not in contact, (4, 3), m/s², odometry frame.
+
+    ẍ_des = ẍ_ref + kp (x_ref − x) + kd (ẋ_ref − ẋ)
+
+    Args:
+        state: `ROBOT_STATE`; `swing_start`, `foot_goal` and `reaction` change.
+        wz: desired yaw rate, rad/s.
+        gains: `GAINS`.
+    """
+    update_anchors(state, gains)
+    out = np.zeros((4, 3))
+    for leg in range(4):
+        if state.contact[leg] > 0.5:
+            state.reaction[leg] = 0.0
+            continue
+        position, velocity = state.p_foot[leg], state.v_foot[leg]
+        reference = np.zeros((3, 3))
+        if state.stance[leg] > 0.5 or state.early_contact[leg] > 0.5:
+            reference[0] = state.foot_goal[leg]
+            reference[1, 2] = -gains.descent_speed
+        elif state.retraction[leg] > 0.0:
+            reference[0] = position
+            reference[1] = _retraction_velocity(state.reaction[leg], gains.retraction_speed)
+        else:
+            reference = _swing(state, wz, gains, leg)
+        correction = gains.kp_swing * (reference[0] - position)
+        correction = correction + gains.kd_swing * (reference[1] - velocity)
+        out[leg] = reference[2] + correction
+        # What stops a foot that is to move with an acceleration a holds it back by −a.
+        state.reaction[leg] = -correction
+    return out
+
+
+@compiled
+def update_anchors(state: np.record, gains: np.record) -> None:
+    """Note where swings begin; lower the feet that shall stand and have no ground.
+
+    With `track_sinking_trunk` they are lowered as seen from a trunk that sinks, as far as legs
+    reach.
+    """
+    descent, tracks = gains.descent_speed * state.dt, gains.track_sinking_trunk > 0.5
+    goal, switched = state.foot_goal, state.switched > 0.5
+    for leg in range(4):
+        stands, p_foot = state.stance[leg] > 0.5, state.p_foot[leg]
+        if not stands and (switched or state.lift[leg] == state.progress):
+            state.swing_start[leg] = p_foot
+        if state.contact[leg] > 0.5:
+            goal[leg] = p_foot
+        elif stands or state.early_contact[leg] > 0.5:
+            if not tracks:
+                goal[leg, 2] -= descent
+                continue
+            if switched and stands:
+                goal[leg] = p_foot
+            goal[leg, 2] -= descent - min(0.0, state.velocity[2]) * state.dt
+            goal[leg, 2] = max(goal[leg, 2], state.position[2] - gains.reach)
+        elif tracks:
+            goal[leg] = p_foot
+
+
+@compiled
+def _retraction_velocity(reaction: Array, speed: float) -> Array:
+    """Velocity of a foot that was stopped: up, and back from what stopped it in the plane. (3,)."""
+    out = np.array([0.0, 0.0, speed])
+    plane = np.sqrt(reaction[0] ** 2 + reaction[1] ** 2)
+    if plane > 1e-6:
+        out[0] = _BACK * speed * reaction[0] / plane
+        out[1] = _BACK * speed * reaction[1] / plane
+    return out
+
+
+@compiled
+def _swing(state: np.record, wz: float, gains: np.record, leg: int) -> Array:
+    """Reference of a swing foot, see `swing_reference`."""
+    expected, count = 0.0, 0.0  # the ground at a foothold: the mean under the feet that stand
+    for other in range(4):
+        if state.stance[other] > 0.5:
+            expected += state.ground[other]
+            count += 1.0
+    expected /= max(1.0, count)
+    start, lift = state.swing_start[leg], state.lift[leg]
+    share = 1.0 - lift
+    duration = share * gains.stance_time
+    target = foothold(state, wz, gains, leg)
+    apex = np.max(state.ground) + gains.swing_height
+    if lift > 0.0:
+        apex = max(apex, start[2] + _CLEARANCE)
+        limit_foothold(target, start, gains.swing_acceleration, duration, gains.swing_delay)
+    if gains.track_sinking_trunk > 0.5:
+        apex = min(apex, max(state.position[2] - _SHORTEST, start[2]))
+    ground, progress = expected + gains.foot_radius, (state.progress - lift) / share
+    return swing_reference(start, target, ground, apex, progress, duration, gains.swing_delay)
+
+
+@compiled
+def foothold(state: np.record, wz: float, gains: np.record, leg: int) -> Array:
+    """Raibert foothold p = p_hip + v·t_remaining + v·T_stance/2 + k (v − v_des). Shape (2,), m.
+
+    v is the trunk's velocity; the hip's own velocity from the yaw rate is added to it. It lies no
+    farther than `foothold_inwards` (times 1 + payload / mass) towards the trunk's middle line from
+    under its hip: a trunk that is thrown aside asks for footholds where other legs are.
+
+    Args:
+        state: `ROBOT_STATE`.
+        wz: desired yaw rate, rad/s.
+        gains: `GAINS`.
+        leg: which.
+    """
+    x = (1.0 if leg < 2 else -1.0) * gains.under_hip[0]
+    outwards = 1.0 if leg % 2 == 0 else -1.0
+    y = outwards * gains.under_hip[1]
+    position, velocity, k = state.position, state.velocity, gains.raibert_gain
+    c, s = heading(state.R)
+    rx, ry = c * x - s * y, s * x + c * y
+    ahead = (1.0 - state.progress) * gains.stance_time + 0.5 * gains.stance_time
+    out = np.empty(2)
+    out[0] = position[0] + rx + (velocity[0] - wz * ry) * ahead
+    out[1] = position[1] + ry + (velocity[1] + wz * rx) * ahead
+    out[0] += k * (velocity[0] - state.v_des[0])
+    out[1] += k * (velocity[1] - state.v_des[1])
+    mass = gains.body_mass + state.payload
+    inwards = mass / gains.body_mass * gains.foothold_inwards
+    aside = c * (out[1] - position[1]) - s * (out[0] - position[0]) - y
     beyond = -inwards - outwards * aside
     if beyond > 0.0:
-        target[0] -= s * outwards * beyond
-        target[1] += c * outwards * beyond
+        out[0] -= s * outwards * beyond
+        out[1] += c * outwards * beyond
+    return out
 
 
 @compiled
@@ -117,6 +222,8 @@ def swing_reference(
     delay: float,
 ) -> Array:
     """Reference of one swing foot's centre. Shape (3, 3): rows position, velocity, acceleration.
+
+    Minimum jerk in the plane, a Bézier curve in height.
 
     Args:
         start: where the foot left the ground, (3,), m.

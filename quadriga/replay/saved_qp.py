@@ -24,7 +24,7 @@ import numpy as np
 from quadriga.agents.agent import Agent, AgentState, Inputs, StepProblems
 from quadriga.agents.planner.qp_solver import SolvedQp
 from quadriga.shared.errors import RecordingError, name_file_errors
-from quadriga.shared.robots.conventions import Array
+from quadriga.shared.robots.conventions import N_JOINTS, Array
 from quadriga.shared.runtime.npz import UNREADABLE, as_measured, open_npz
 
 WHOLE_BODY: Final = "command"  # the topic that is made of it
@@ -112,15 +112,17 @@ def problems_of(agent: Agent, before: AgentState, inputs: Inputs, about: str) ->
 
 
 def _save_whole_body(problems: StepProblems, about: str) -> SavedQp:
-    qp, answer = problems.whole_body, problems.whole_body_solution
+    qp = problems.whole_body
+    cones = 5 * qp.feet  # the other rows do not exist without more feet in contact
+    rows = N_JOINTS + cones
     return SavedQp(
         qp.H,
         qp.g,
-        qp.C,
-        np.concatenate([qp.tau_min, qp.c]),
-        np.concatenate([qp.tau_max, np.full(len(qp.c), _FAR)]),
-        answer.tau,
-        f"whole-body QP of {about}, {answer.status}: x is the torques [N·m]",
+        qp.C[:cones],
+        qp.lower[:rows],
+        qp.upper[:rows],
+        qp.tau,
+        f"whole-body QP of {about}, {qp.status}: x is the torques [N·m]",
     )
 
 

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from quadriga.agents.controller.maths.leg_kinematics import leg_kinematics
+from quadriga.agents.estimator.kinematics import leg_kinematics
 from quadriga.agents.gait import scheduled_stance
 from quadriga.recordings.traces import Traces
 from quadriga.recordings.truth import Ticks, stack, ticks_of

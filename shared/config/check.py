@@ -61,20 +61,13 @@ def _check_world(world: WorldConfig, names: tuple[str, ...]) -> None:
 
 
 def _check_models(config: Config) -> None:
-    """Friction needs inertia; counts of feet are not taken for N."""
-    motors, team = config.motors, config.team
+    """Friction needs inertia."""
+    motors = config.motors
     friction = max(motors.friction, motors.viscous_friction)
     if friction > 0.0 and not motors.rotor_inertia:
         got, expected = f"false with joint friction of {friction:g}", "true, or no joint friction"
         cause = "friction of light joints turns their rates around at every tick"
         raise ConfigError("motors.rotor_inertia", got, expected, cause)
-    measures = team.plant == SIMULATED and config.sensors.foot_sensor == "newtons"
-    known = team.plant in (SIMULATED, BRIDGED)
-    if config.controller.foot_load == "sensor" and known and not measures:
-        got = "'sensor' with feet that give counts"
-        expected = "'fused', or simulated robots with sensors.foot_sensor = 'newtons'"
-        cause = "counts of unknown scale and bias would be taken for N"
-        raise ConfigError("controller.foot_load", got, expected, cause)
 
 
 def _check_planner(planner: PlannerConfig, world: WorldConfig) -> None:

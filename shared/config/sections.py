@@ -266,7 +266,7 @@ class EstimatorConfig:
     tilt_time: float = number(
         5.0, "s", 0.0, 1e4, "time constant of finding the IMU's tilt and bias by the legs; 0: never"
     )
-    contact_force: float = number(10.0, "N", 0.0, 200.0, "a foot with less load is not trusted")
+    trust_force: float = number(10.0, "N", 0.0, 200.0, "a foot with less load is not trusted")
 
 
 @dataclass(frozen=True, slots=True)
@@ -314,11 +314,6 @@ class ControllerConfig:
     kp_swing: float = number(400.0, "1/s²", 0.0, 1e4, "swing foot")
     kd_swing: float = number(40.0, "1/s", 0.0, 1e3, "swing foot rate")
     contact_detection: bool = flag(True, "early touchdown becomes stance, a lost foot descends")
-    foot_load: str = choice(
-        ("fused", "sensor"),
-        "what feet bear. fused: by the joints' torques, and by foot sensors as far as they agree "
-        "with those; sensor: by foot sensors alone, which must measure N",
-    )
     contact_force: float = number(4.0, "N", 0.5, 100.0, "load by a foot sensor that is contact")
     contact_torque_force: float = number(12.0, "N", 0.5, 200.0, "load by torques that is contact")
     reaction_filter_ms: float = number(
@@ -330,7 +325,6 @@ class ControllerConfig:
     reject_side_contacts: bool = flag(
         True, "a foot stopped from the side is no contact, nor an early one that bears no load"
     )
-    liftoff_hold_ms: int = number(0, "ms", 0, 1000, "how long lift-off waits for contact")
     reflex_ms: int = number(10, "ms", 0, 100, "a stopped swing foot rises until free for this")
     reflex_lift: float = number(1.0, "m/s", 0.0, 3.0, "its upward speed")
     track_sinking_trunk: bool = flag(
@@ -608,8 +602,7 @@ class Config:
     @property
     def feet_measure_newtons(self) -> bool:
         """Whether foot forces of messages are N, and not counts of unknown scale and bias."""
-        simulated = self.team.plant == SIMULATED and self.sensors.foot_sensor == "newtons"
-        return simulated or self.controller.foot_load == "sensor"
+        return self.team.plant == SIMULATED and self.sensors.foot_sensor == "newtons"
 
     @property
     def response_file(self) -> str:

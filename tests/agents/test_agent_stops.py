@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from quadriga.agents.controller import controller
-from quadriga.agents.controller.whole_body.limited import LIMITED
-from quadriga.agents.controller.whole_body.problem import WholeBodySolution
+from quadriga.agents.controller.whole_body_qp import WholeBodySolution
 from quadriga.agents.telemetry import Telemetry
 from quadriga.agents.validate import AGREES_MS, HOLD_MS
 from quadriga.shared.codec import decode, encode
@@ -145,10 +144,10 @@ def test_who_stands_without_an_attitude_does_not_lead_a_knee_that_is_not_known()
 
 
 def fail(monkeypatch: pytest.MonkeyPatch) -> None:
-    def no_solution(_free: bool, row: Array, contact: Array) -> WholeBodySolution:
-        return WholeBodySolution(np.zeros_like(row[LIMITED.x]), "infeasible:-1", contact)
+    def no_solution(row: Array, _free: bool) -> WholeBodySolution:
+        return WholeBodySolution(np.zeros_like(row), "infeasible:-1")
 
-    monkeypatch.setattr(controller, "finish", no_solution)
+    monkeypatch.setattr(controller, "solve_qp", no_solution)
 
 
 def test_without_a_solution_the_last_torques_hold_and_then_the_joints_are_damped(

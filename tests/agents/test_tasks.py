@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from quadriga.agents.agent import Agent, Outputs
-from quadriga.agents.controller.controller import ControllerOutputs, Task
+from quadriga.agents import agent as agent_module
+from quadriga.agents.agent import Outputs
+from quadriga.agents.controller.controller import control
+from quadriga.agents.controller.trunk import TrunkCommand
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.config.sections import Config, TeamConfig
 from quadriga.shared.messages import Plan
@@ -27,17 +29,15 @@ class Watched:
         self.config = replace(ALONE, planner=replace(ALONE.planner, latency_ms=0, **planner))
         predictor = simple_predictor(self.config)
         self.rollout = Rollout(self.config, predictor, every_100_ms)
-        self.asked: list[tuple[int, Task, Plan]] = []
+        self.asked: list[tuple[int, TrunkCommand, Plan]] = []
         self._plan: Plan | None = None
-        agent: Agent = self.rollout.agents["r1"]
-        act = agent._controller.act
 
-        def seen(at: Any, schedule: Any, task: Task, *rest: Any, **named: Any) -> ControllerOutputs:
-            self._tasks.append(task)
-            return act(at, schedule, task, *rest, **named)
+        def seen(state: Any, command: TrunkCommand, gains: Array, **named: Any) -> Any:
+            self._tasks.append(command)
+            return control(state, command, gains, **named)
 
-        self._tasks: list[Task] = []
-        monkeypatch.setattr(agent._controller, "act", seen)
+        self._tasks: list[TrunkCommand] = []
+        monkeypatch.setattr(agent_module, "control", seen)
 
     def walk(self, until: int) -> Watched:
         for tick in self.rollout.ticks(until):

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import osqp
 import pinocchio as pin
 from scipy import sparse
 
-from quadriga.agents.controller.whole_body.problem import Goal, Weights
 from quadriga.shared.robots.conventions import Array
 from tests.a1 import TORQUE_LIMIT
-from tests.agents.controller.poses import FEET, MODEL, Pose
+from tests.agents.estimator.poses import FEET, MODEL
 
 _FRAME = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 _S = np.vstack([np.zeros((6, 12)), np.eye(12)])
@@ -30,7 +30,7 @@ class Dynamics:
     d_h: Array
 
 
-def dynamics(pose: Pose, contact: Array) -> Dynamics:
+def dynamics(pose: Any) -> Dynamics:
     """Pinocchio's terms: contact feet, then the outputs (trunk, remaining feet)."""
     data = MODEL.createData()
     M = pin.crba(MODEL, data, pose.q)
@@ -40,8 +40,8 @@ def dynamics(pose: Pose, contact: Array) -> Dynamics:
     pin.updateFramePlacements(MODEL, data)
     J = [pin.getFrameJacobian(MODEL, data, foot, _FRAME)[:3] for foot in FEET]
     d = [pin.getFrameClassicalAcceleration(MODEL, data, foot, _FRAME).linear for foot in FEET]
-    on, off = np.flatnonzero(contact > 0.5), np.flatnonzero(contact < 0.5)
-    R = pose.estimate.R
+    on, off = np.flatnonzero(pose.contact > 0.5), np.flatnonzero(pose.contact < 0.5)
+    R = pose.R
     trunk = np.zeros((6, 18))
     trunk[:3, :3] = trunk[3:, 3:6] = R
     centripetal = np.concatenate([R @ np.cross(pose.v[3:6], pose.v[:3]), np.zeros(3)])
@@ -55,22 +55,20 @@ def dynamics(pose: Pose, contact: Array) -> Dynamics:
     )
 
 
-def desired(goal: Goal) -> Array:
+def desired(pose: Any) -> Array:
     """The outputs' desired accelerations in the order of `Dynamics.J_h`."""
-    return np.concatenate(
-        [goal.trunk, *(goal.swing[leg] for leg in range(4) if not goal.contact[leg])]
-    )
+    return np.concatenate([pose.acc_des, *pose.swing_acc_des[pose.contact < 0.5]])
 
 
-def solve_full(pose: Pose, goal: Goal, weights: Weights) -> tuple[Array, Array, Array]:
+def solve_full(pose: Any, weights: Any) -> tuple[Array, Array, Array]:
     """Optimal torques (12,), stacked contact forces (3 n_c,) and defect (6 + 3 n_s,).
 
     Raises:
         RuntimeError: OSQP does not call its answer solved.
     """
-    dyn, n_c = dynamics(pose, goal.contact), int(goal.contact.sum())
+    dyn, n_c = dynamics(pose), int(pose.contact.sum())
     n_f, n_h = 3 * n_c, len(dyn.d_h)
-    f_des = goal.force[goal.contact > 0.5].ravel()
+    f_des = pose.force_des[pose.contact > 0.5].ravel()
     gammas = (weights.gamma_tau, weights.gamma_force, weights.gamma_defect)
     P = np.repeat(gammas, (12, n_f, n_h))
     W = np.repeat((1.0, weights.tilt_length, weights.swing_weight), (3, 3, n_h - 6))
@@ -94,7 +92,7 @@ def solve_full(pose: Pose, goal: Goal, weights: Weights) -> tuple[Array, Array, 
             ),
         ]
     )
-    fixed = np.concatenate([dyn.J_c @ free - dyn.d_c, dyn.J_h @ free - dyn.d_h + desired(goal)])
+    fixed = np.concatenate([dyn.J_c @ free - dyn.d_c, dyn.J_h @ free - dyn.d_h + desired(pose)])
     limit = np.full(12, TORQUE_LIMIT)
     least = np.tile([weights.force_min, 0.0, 0.0, 0.0, 0.0], n_c)
     lower = np.concatenate([fixed, -limit, least])

@@ -49,10 +49,10 @@ def walk(config: Config, ticks: int, predictor: Predictor | None = None) -> Walk
     for _ in range(ticks):
         truth = rollout.world.truth()
         rollout.step()
-        memories = [rollout.states[name].low_level for name in rollout.world.names]
+        states = [rollout.states[name].controller_state for name in rollout.world.names]
         position.append(truth.base_pos)
         velocity.append(truth.base_vel)
-        estimated.append([memory.mean[1] for memory in memories if memory is not None])
+        estimated.append([state.velocity for state in states if state is not None])
     return Walk(rollout.world.fallen(), *map(np.array, (position, velocity, estimated)))
 
 

@@ -132,7 +132,6 @@ def test_every_key_keeps_its_range_and_says_what_it_is(section: str) -> None:
         ("[identification]\nvx = [0.5, -0.5]\n", "identification.vx"),
         ('[identification]\npredictor = "pinv"\nresponse = "a"\n', "identification.response"),
         ("[motors]\nrotor_inertia = false\n", "motors.rotor_inertia"),
-        ('[controller]\nfoot_load = "sensor"\n', "controller.foot_load"),
         ('[team]\nplant = "robots"\n', "team.plant_per_robot"),
         ('[team]\nplant = "robots"\nplant_per_robot = true\n', "world.mode"),
         ("[team]\nplant_per_robot = true\n", "team.plant_per_robot"),

@@ -36,7 +36,7 @@ def test_the_plain_setting_is_without_what_the_robust_one_adds() -> None:
     assert plain.ki_z == plain.ki_xy == 0.0
     assert not any((plain.reject_side_contacts, plain.track_sinking_trunk, plain.flight))
     assert plain.tilt_length == plain.swing_weight == 1.0
-    assert plain.liftoff_hold_ms == plain.reflex_ms == plain.swing_delay == plain.slip_speed == 0
+    assert plain.reflex_ms == plain.swing_delay == plain.slip_speed == 0
     assert (plain.gamma_tau, plain.gamma_force, plain.gamma_defect) == (1e2, 1e3, 1e6)
 
 

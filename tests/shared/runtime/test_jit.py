@@ -137,7 +137,7 @@ def test_the_sources_are_those_with_compiled_functions_and_what_they_import() ->
     root = places.SOURCE
     found = {str(path.relative_to(root)) for path in jit_cache.sources(root)}
     assert {
-        "quadriga/agents/controller/acting.py",
+        "quadriga/agents/estimator/filter.py",
         "quadriga/agents/controller/swing.py",
         "quadriga/agents/gait.py",
         "quadriga/shared/robots/a1.py",
