@@ -16,9 +16,8 @@ from quadriga.agents.planning.team import Central, CentralOutputs, CentralState
 from quadriga.agents.plausibility import is_within_limits
 from quadriga.agents.rehearsal import rehearse_central
 from quadriga.agents.time_grid import step_ms
-from quadriga.shared.bus.discovery import join
+from quadriga.shared.bus.discovery import ProcessInfo, join
 from quadriga.shared.bus.liveness import Liveness
-from quadriga.shared.bus.process_info import ProcessInfo
 from quadriga.shared.bus.session import POLL, READY, Bus
 from quadriga.shared.codec import decode, encode
 from quadriga.shared.codes import code_of

@@ -11,7 +11,6 @@ from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.predictor.store import predictor_sha256
 from quadriga.agents.shell import answer_states
 from quadriga.agents.tick_cost import rehearse_in_time
-from quadriga.shared.bus.discovery import STARTS
 from quadriga.shared.config.sections import Config
 from quadriga.shared.runtime.blas import use_one_blas_thread
 from quadriga.shared.runtime.clock import monotonic_ns
@@ -27,9 +26,6 @@ def run(
     collected: Collected | None = None,
 ) -> None:
     """Walk one robot until the walk ends or it is stopped.
-
-    In real time an agent that is started while its team walks takes its robot over: it gets it up
-    where it is.
 
     Args:
         config: the team's configuration.
@@ -47,9 +43,9 @@ def run(
     use_one_blas_thread()
     agent = Agent(config, robot, predictor, monotonic_ns, collected)
 
-    def rehearse(joined: str) -> None:
+    def rehearse() -> None:
         rehearsed = Agent(config, robot, predictor, collected=collected)
-        rehearse_in_time(config, rehearsed, refuse=joined == STARTS)
+        rehearse_in_time(config, rehearsed, refuse=True)
         end_collection()
 
     inbox = Inbox(config, robot, agent.peers)

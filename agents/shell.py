@@ -12,9 +12,8 @@ from quadriga.agents.modes import Mode
 from quadriga.agents.planning.interface import NOTHING, Expected
 from quadriga.agents.step_io import Inputs, Outputs
 from quadriga.agents.telemetry import Telemetry
-from quadriga.shared.bus.discovery import join
+from quadriga.shared.bus.discovery import ProcessInfo, join
 from quadriga.shared.bus.liveness import Liveness
-from quadriga.shared.bus.process_info import ProcessInfo
 from quadriga.shared.bus.session import HERE, POLL, READY, Bus
 from quadriga.shared.codec import encode
 from quadriga.shared.config.sections import Config
@@ -69,7 +68,7 @@ def answer_states(
     agent: SteppedAgent[S],
     inbox: Inbox,
     stopped: Callable[[], bool],
-    rehearse: Callable[[str], None],
+    rehearse: Callable[[], None],
     predictor_sha256: str = "",
 ) -> None:
     """Be a robot's agent on the bus until the walk ends or it is stopped.
@@ -79,13 +78,12 @@ def answer_states(
         agent: answers the states.
         inbox: what reaches it.
         stopped: asked often whether to stop.
-        rehearse: called once all are there, with how this process has joined them: `STARTS` or
-            `REJOINS`. A stop interrupts it.
+        rehearse: called once all are there. A stop interrupts it.
         predictor_sha256: digest of the predictor that it plans with; "": none.
 
     Raises:
         BusError: the bus cannot be opened, or the team is not complete in time, has something
-            else in common, or walks already in lock-step.
+            else in common, or walks already.
         ProcessError: who drives time, or the link to the router, has vanished.
         KeyboardInterrupt: it is stopped before it is ready.
     """
@@ -93,11 +91,10 @@ def answer_states(
         for key in inbox.keys:
             bus.subscribe(key)
         info = ProcessInfo(bus, config, predictor_sha256)
-        joined = join(bus, config, stopped, info, rejoins=True)
-        if not joined:
+        if not join(bus, config, stopped, info):
             return
         with interruptible(stopped):
-            rehearse(joined)
+            rehearse()
         shell = AgentShell(config, agent, inbox, bus)
         with at_work(config.runtime.priority):
             bus.declare(READY)

@@ -12,7 +12,7 @@ from typing import Final
 
 from quadriga.agents.agent import Agent
 from quadriga.agents.rehearsal import rehearse
-from quadriga.shared.bus.endpoint import is_loopback
+from quadriga.shared.config.endpoints import is_loopback
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.runtime.clock import thread_ns

@@ -42,10 +42,7 @@ def _note_operator(server: PlantServer, present: Collection[str]) -> None:
         return
     server.operator_gone = gone
     if gone:
-        note = server.bus.standstill.note
-        server.announce(
-            codes.OPERATOR_GONE, "", f"operator gone: no reference counts any more{note}"
-        )
+        server.announce(codes.OPERATOR_GONE, "", "operator gone: no reference counts any more")
     else:
         server.announce(codes.OPERATOR_BACK, "", "the operator is there again")
 

@@ -15,9 +15,14 @@ from quadriga.plant.end import End
 from quadriga.shared import codes
 from quadriga.shared.about import ABOUT
 from quadriga.shared.bus.diagnostics import CLOCK_REMEDY, PACE_LIMIT, ClockOffset, MemberAnswer
-from quadriga.shared.bus.discovery import ask, ask_clock, read_about, start_together
-from quadriga.shared.bus.membership import lead
-from quadriga.shared.bus.process_info import ProcessInfo
+from quadriga.shared.bus.discovery import (
+    ProcessInfo,
+    ask,
+    ask_clock,
+    lead,
+    read_about,
+    start_together,
+)
 from quadriga.shared.bus.session import HERE, Answers, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError

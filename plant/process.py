@@ -15,9 +15,8 @@ from quadriga.plant.server import PlantServer
 from quadriga.plant.team_time import team_time
 from quadriga.plant.words import listen_to_estops, listen_to_words
 from quadriga.shared import codes
-from quadriga.shared.bus.discovery import await_agents, join, start_together
+from quadriga.shared.bus.discovery import ProcessInfo, await_agents, join, start_together
 from quadriga.shared.bus.liveness import Loss, loss_error
-from quadriga.shared.bus.process_info import ProcessInfo
 from quadriga.shared.bus.session import Bus
 from quadriga.shared.config.sections import BRIDGED, Config
 from quadriga.shared.errors import ProcessError

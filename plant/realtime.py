@@ -64,9 +64,8 @@ def _look_at_others(server: PlantServer, pace: TeamPace | None) -> None:
         return
     time.look(server.bus.members_at(HERE))
     timeout = server.config.bus.clock_timeout
-    note = server.bus.standstill.note
     if behind := time.behind(tick - round(1000 * timeout)):
-        time.end = plant_gone(sorted(behind), f"silent for {timeout:g} s{note}")
+        time.end = plant_gone(sorted(behind), f"silent for {timeout:g} s")
     if news := pace.news():
         server.announce(codes.CLOCK_OFF, server.plant.names[0], news)
     if (was_set := pace.look()) is not None:

@@ -14,9 +14,8 @@ from quadriga.plant.protocol import Plant
 from quadriga.plant.team_time import TeamTime
 from quadriga.plant.words import NO_WORDS, Words
 from quadriga.shared import codes
-from quadriga.shared.bus.liveness import LossTimer, find_lost_link
-from quadriga.shared.bus.membership import members
-from quadriga.shared.bus.session import HERE, Bus
+from quadriga.shared.bus.liveness import find_lost_link
+from quadriga.shared.bus.session import Bus
 from quadriga.shared.codec import encode, truncate_text
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
@@ -24,10 +23,8 @@ from quadriga.shared.errors import ConfigError
 from quadriga.shared.members import SIM
 from quadriga.shared.messages import Clock, Command, Event, Reset, SafeStop, Status, format_event
 from quadriga.shared.robots.conventions import robot_names
-from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.topics import CLOCK, EVENT, POSTURE, STATE, STATUS, TRUTH
 
-_TOLD_AFTER: Final = 5.0  # s; a process looks for a router that is gone at least every 4 s
 FALL_LINGER_MS: Final = 1000  # world time that is still shown after the first simulated fall
 # World time in which a team that has been asked to stop slows down, comes to stand and settles.
 STOP_LINGER_MS: Final = 2000
@@ -70,8 +67,6 @@ class PlantServer:
         # What is said may come twice; a release may end no stop that was pressed meanwhile.
         self._heard: SafeStop | None = None
         self._released: Reset | None = None
-        self._outage: tuple[float, float] | None = None  # when the link was back, and after what
-        self._link = LossTimer(lambda: find_lost_link(bus, config), config, grace=0.0)
         self._put_state = {
             name: bus.publisher(STATE.key(team, name), droppable=realtime) for name in plant.names
         }
@@ -144,25 +139,10 @@ class PlantServer:
             self.take(*packet, oldest)
 
     def look_at_link(self) -> None:
-        """Set the end of this plant's walk if its link to the router is gone for good.
-
-        Nobody hears it then. That a link is back is announced once the others have one, too.
-        """
-        before, loss, now = self._link.since, self._link.poll(), monotonic()
+        """Set the end of this plant's walk if its link to the router is gone: nobody hears it."""
+        loss = find_lost_link(self.bus, self.config)
         if loss is not None and self.time.end is None:
             self.time.end = End(*loss)
-        if before is not None and self._link.since is None:
-            self._outage = now, now - before
-        if self._outage is not None and self._others_are_back(now - self._outage[0]):
-            seconds, self._outage = self._outage[1], None
-            self.announce(codes.LINK_BACK, "", f"no link to the router for {seconds:.1f} s")
-
-    def _others_are_back(self, waited: float) -> bool:
-        """Whether the others have a link again, `waited` seconds after this one, or never will."""
-        if waited > self.config.bus.reconnect_timeout:
-            return True
-        here = {self.bus.name, *self.bus.members_at(HERE)}
-        return waited > _TOLD_AFTER and here.issuperset(members(self.config))
 
     def announce(self, code: str, robot: str, detail: str) -> None:
         """Publish an event of the present tick; a detail longer than a message's text is cut."""
@@ -172,7 +152,7 @@ class PlantServer:
         """Why a robot is given up, and what was wrong with its latest command if something was."""
         if refused := self.commands.why_refused(robot):
             why += f", its last command was refused ({refused})"
-        return why + self.bus.standstill.note
+        return why
 
     def publish_status(self, status: Status) -> None:
         """Publish the plant's report on itself."""

@@ -54,7 +54,6 @@ HALTS: Final = "halts"
 RESUMED: Final = "resumed"
 RISES: Final = "rises"
 STANDS_AGAIN: Final = "stands-again"
-LINK_BACK: Final = "link-back"
 BRIDGE_MODE: Final = "bridge-mode"
 ROBOT_STOPPED: Final = "robot-stopped"
 CLOCK_OFF: Final = "clock-off"
@@ -91,7 +90,6 @@ EVENTS: Final[Mapping[str, EventCode]] = MappingProxyType(
         ),
         RISES: EventCode("fault", "an agent gets its robot up, which was led down or stopped"),
         STANDS_AGAIN: EventCode("fault", "an agent's robot stands that had been down"),
-        LINK_BACK: EventCode("fault", "the link to the router was gone for a while"),
         BRIDGE_MODE: EventCode(
             "bridge", "a bridge's robot begins to stand up, walk or lie down, or is hot"
         ),

@@ -46,7 +46,7 @@ def serve(step: Step, task: ControllerTask | None = None) -> None:
         stopped = stop_on_signals()
         agent = SteppedController(robot.config, robot.robot, step)
         inbox = Inbox(robot.config, robot.robot, peers=())
-        answer_states(robot.config, agent, inbox, stopped, lambda _: _load_codec())
+        answer_states(robot.config, agent, inbox, stopped, _load_codec)
     except QuadrigaError as error:
         print(printable_line(f"quadriga: {error}"), file=sys.stderr, flush=True)
         raise SystemExit(_FAILED) from None

@@ -16,7 +16,7 @@ from quadriga.shared.bus.diagnostics import (
     UNKNOWN,
     Diagnosis,
 )
-from quadriga.shared.bus.membership import processes
+from quadriga.shared.bus.discovery import processes
 from quadriga.shared.bus.settings import RECEIVE_BUFFER
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import OPERATOR, RECORDER

@@ -12,10 +12,8 @@ from quadriga.recorder.parts import Parts
 from quadriga.recorder.selection import KeyFilter, Selection
 from quadriga.recorder.session import Session
 from quadriga.recordings.metadata import CONTINUES, build_metadata
-from quadriga.shared.bus.discovery import REJOINS, await_members, join
+from quadriga.shared.bus.discovery import ProcessInfo, await_members, join, members
 from quadriga.shared.bus.liveness import loss_error
-from quadriga.shared.bus.membership import members
-from quadriga.shared.bus.process_info import ProcessInfo
 from quadriga.shared.bus.session import HERE, READY, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
@@ -167,7 +165,7 @@ def _note_end(parts: Parts, session: Session) -> ProcessError | None:
     if loss is None:
         return None
     tick = max(parts.last_tick(), 0)
-    error = loss_error(loss, tick, session.loss_ns, session.note)
+    error = loss_error(loss, tick, session.loss_ns)
     detail, missed = f"{error.name}: {error.got}", str(session.loss_ns)
     parts.note(END, {"code": loss.code, "detail": detail, "tick": str(tick), "missed_ns": missed})
     return error
@@ -192,8 +190,4 @@ def _join(bus: Bus, config: Config, stopped: Callable[[], bool], me: ProcessInfo
     walking, doubled = has_lead(bus.members_at(READY)), RECORDER in bus.members_at(HERE)
     if walking or doubled or not config.recorder.enabled:
         return LATE
-    joined = join(bus, config, stopped, me, rejoins=True)
-    if joined == REJOINS:  # a busy machine has let it know late that the team walks
-        bus.withdraw()
-        return LATE
-    return MEMBER if joined else ""
+    return MEMBER if join(bus, config, stopped, me) else ""

@@ -102,14 +102,6 @@ class BusConfig:
     barrier_timeout: float = key(
         60.0, "s", "how long to wait for all processes before giving up", low=0.1, high=3600.0
     )
-    reconnect_timeout: float = key(
-        30.0,
-        "s",
-        "client mode, realtime, one plant: how long processes wait for a router that is gone to be "
-        "back, before they leave; meanwhile simulated robots are led down",
-        low=0.0,
-        high=600.0,
-    )
     clock_timeout: float = key(
         0.5,
         "s",

@@ -41,16 +41,6 @@ def periods(config: Config) -> dict[str, int]:
     return found
 
 
-def waits_for_router(config: Config) -> bool:
-    """Whether processes do without a router for `bus.reconnect_timeout` before they leave.
-
-    In lock-step a message that is lost would not be sent again. Where each robot has a plant of its
-    own, none goes on without the others.
-    """
-    realtime, alone = config.world.mode == "realtime", not config.team.plant_per_robot
-    return config.bus.mode == "client" and realtime and alone
-
-
 def max_ages(config: Config) -> dict[str, int]:
     """Longest gap, and greatest age in use, that is nothing unusual, by topic, ms; 0: none.
 

@@ -28,8 +28,7 @@ from quadriga.shared.bus.diagnostics import (
     describe_absent,
     diagnose,
 )
-from quadriga.shared.bus.discovery import read_about
-from quadriga.shared.bus.process_info import describe_process
+from quadriga.shared.bus.discovery import describe_process, read_about
 from quadriga.shared.codec import decode, encode, envelope
 from quadriga.shared.config.load import load
 from quadriga.shared.errors import MessageError
