@@ -14,15 +14,14 @@ from typing import Final
 from quadriga.plant.end import End
 from quadriga.shared import codes
 from quadriga.shared.about import ABOUT
-from quadriga.shared.bus.diagnostics import CLOCK_REMEDY, PACE_LIMIT, ClockOffset, MemberAnswer
-from quadriga.shared.bus.discovery import (
-    ProcessInfo,
-    ask,
-    ask_clock,
+from quadriga.shared.bus.diagnostics import (
+    CLOCK_REMEDY,
+    PACE_LIMIT,
+    ClockOffset,
+    MemberAnswer,
     lead,
-    read_about,
-    start_together,
 )
+from quadriga.shared.bus.discovery import ProcessInfo, ask, ask_clock, read_about, start_together
 from quadriga.shared.bus.session import HERE, Answers, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError

@@ -21,15 +21,10 @@ from quadriga.shared.bus.diagnostics import (
     TeamView,
     diagnose,
     disagreements,
-)
-from quadriga.shared.bus.discovery import (
-    ask,
-    ask_clock,
-    describe_process,
     members,
     processes,
-    view_of,
 )
+from quadriga.shared.bus.discovery import ask, ask_clock, describe_process, view_of
 from quadriga.shared.bus.session import HERE, Bus, pause
 from quadriga.shared.bus.settings import OPEN, REFUSED, UNTRIED, Reach, try_endpoint
 from quadriga.shared.config.endpoints import is_loopback, is_tls

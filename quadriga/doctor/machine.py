@@ -15,8 +15,8 @@ from quadriga.shared.bus.diagnostics import (
     NOTE,
     UNKNOWN,
     Diagnosis,
+    processes,
 )
-from quadriga.shared.bus.discovery import processes
 from quadriga.shared.bus.settings import RECEIVE_BUFFER
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import OPERATOR, RECORDER

@@ -12,7 +12,8 @@ from quadriga.recorder.parts import Parts
 from quadriga.recorder.selection import KeyFilter, Selection
 from quadriga.recorder.session import Session
 from quadriga.recordings.metadata import CONTINUES, build_metadata
-from quadriga.shared.bus.discovery import ProcessInfo, await_members, join, members
+from quadriga.shared.bus.diagnostics import members
+from quadriga.shared.bus.discovery import ProcessInfo, await_members, join
 from quadriga.shared.bus.liveness import loss_error
 from quadriga.shared.bus.session import HERE, READY, Bus
 from quadriga.shared.config.sections import Config

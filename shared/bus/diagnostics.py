@@ -8,8 +8,11 @@ from typing import Final, NamedTuple
 
 from quadriga.shared.about import HERE, READY, STAGES, STARTED, WARMING_UP, About
 from quadriga.shared.about import REFUSED as NOT_GRANTED
+from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError
-from quadriga.shared.members import SIM, Member
+from quadriga.shared.members import LEADS, PLANNER, SIM, Member, team_members
+from quadriga.shared.planner_kinds import find_kind
+from quadriga.shared.robots.conventions import robot_names
 
 GOOD: Final = "good"
 NOTE: Final = "note"  # worth knowing, and nothing is wrong
@@ -43,6 +46,35 @@ _STAGES: Final = {
     WARMING_UP: (NOTE, "still warming up"),
     READY: (GOOD, "ready"),
 }
+
+
+def processes(config: Config) -> tuple[Member, ...]:
+    """All processes of a team, in the order of the table of processes."""
+    return team_members(
+        robot_names(config.team.robots),
+        central=find_kind(config.planner.kind).central,
+        recorded=config.recorder.enabled,
+        plant_each=config.team.plant_per_robot,
+        foreign=bool(config.team.agent_command),
+    )
+
+
+def members(config: Config) -> frozenset[str]:
+    """Names of all processes of a team."""
+    return frozenset(member.name for member in processes(config))
+
+
+def lead(config: Config) -> str:
+    """Name of the process that drives the team's time, with which all others leave."""
+    return next(member.name for member in processes(config) if member.name in LEADS)
+
+
+def first_predicting(config: Config) -> str:
+    """Name of the first process that plans with a predictor; "" if none does."""
+    kind = find_kind(config.planner.kind)
+    if not kind.needs_predictor:
+        return ""
+    return PLANNER if kind.central else robot_names(config.team.robots)[0]
 
 
 class ClockOffset(NamedTuple):

@@ -21,6 +21,10 @@ from quadriga.shared.bus.diagnostics import (
     TeamView,
     describe_absent,
     disagreements,
+    first_predicting,
+    lead,
+    members,
+    processes,
     refuse,
 )
 from quadriga.shared.bus.session import HERE, READY, Bus, pause
@@ -29,9 +33,7 @@ from quadriga.shared.codec import decode, encode
 from quadriga.shared.config.agreed import agreed_keys
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError, MessageError
-from quadriga.shared.members import LEADS, PLANNER, RECORDER, SIM, Member, has_lead, team_members
-from quadriga.shared.planner_kinds import find_kind
-from quadriga.shared.robots.conventions import robot_names
+from quadriga.shared.members import LEADS, RECORDER, SIM, has_lead
 from quadriga.shared.runtime.clock import monotonic, wall_ns
 from quadriga.shared.runtime.installed import (
     PROJECT,
@@ -58,35 +60,6 @@ _EVERY: Final = 5.0  # s, between two looks at those that are awaited
 def log(text: str) -> None:
     """Write a line into this process's log."""
     print(f"quadriga: {text}", file=sys.stderr, flush=True)
-
-
-def processes(config: Config) -> tuple[Member, ...]:
-    """All processes of a team, in the order of the table of processes."""
-    return team_members(
-        robot_names(config.team.robots),
-        central=find_kind(config.planner.kind).central,
-        recorded=config.recorder.enabled,
-        plant_each=config.team.plant_per_robot,
-        foreign=bool(config.team.agent_command),
-    )
-
-
-def members(config: Config) -> frozenset[str]:
-    """Names of all processes of a team."""
-    return frozenset(member.name for member in processes(config))
-
-
-def lead(config: Config) -> str:
-    """Name of the process that drives the team's time, with which all others leave."""
-    return next(member.name for member in processes(config) if member.name in LEADS)
-
-
-def first_predicting(config: Config) -> str:
-    """Name of the first process that plans with a predictor; "" if none does."""
-    kind = find_kind(config.planner.kind)
-    if not kind.needs_predictor:
-        return ""
-    return PLANNER if kind.central else robot_names(config.team.robots)[0]
 
 
 class ProcessInfo:

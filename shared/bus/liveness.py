@@ -7,7 +7,8 @@ from collections.abc import Callable
 from datetime import UTC, datetime
 from typing import Final, NamedTuple
 
-from quadriga.shared.bus.discovery import lead, log
+from quadriga.shared.bus.diagnostics import lead
+from quadriga.shared.bus.discovery import log
 from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.codes import LEAD_GONE, LINK_LOST
 from quadriga.shared.config.sections import Config

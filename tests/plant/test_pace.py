@@ -15,8 +15,8 @@ import pytest
 from quadriga.plant import pace as module
 from quadriga.plant.pace import SystemClock, TeamPace
 from quadriga.shared import codes
-from quadriga.shared.bus.diagnostics import ClockOffset, MemberAnswer
-from quadriga.shared.bus.discovery import ProcessInfo, join, members
+from quadriga.shared.bus.diagnostics import ClockOffset, MemberAnswer, members
+from quadriga.shared.bus.discovery import ProcessInfo, join
 from quadriga.shared.bus.session import READY, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config

@@ -29,7 +29,7 @@ from tests.runtime.conftest import BEGUN, WAIT, Make, Team
 
 WAITS = """
 import sys
-from quadriga.shared.bus.discovery import join
+from quadriga.shared.bus.discovery import (join)
 from quadriga.shared.bus.session import Bus
 from quadriga.shared.config.load import parse_assignment, load
 config = load(None, dict(map(parse_assignment, sys.argv[1:])))

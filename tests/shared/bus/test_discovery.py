@@ -13,6 +13,7 @@ import pytest
 
 from quadriga.shared.about import ABOUT
 from quadriga.shared.bus import discovery
+from quadriga.shared.bus.diagnostics import members
 from quadriga.shared.bus.discovery import (
     ProcessInfo,
     ask,
@@ -20,7 +21,6 @@ from quadriga.shared.bus.discovery import (
     check_others,
     describe_process,
     join,
-    members,
     start_together,
     view_of,
 )
