@@ -26,10 +26,9 @@ from quadriga.shared.errors import MessageError
 from quadriga.shared.members import PLANNER
 from quadriga.shared.messages import Event, Measurement, Reference, Status
 from quadriga.shared.robots.conventions import robot_names
-from quadriga.shared.runtime.blas import use_one_blas_thread
+from quadriga.shared.runtime.arithmetic import use_one_blas_thread
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns
-from quadriga.shared.runtime.collector import end_collection
-from quadriga.shared.runtime.scheduling import at_work
+from quadriga.shared.runtime.scheduling import at_work, end_collection
 from quadriga.shared.runtime.signals import interruptible, stop_on_signals
 from quadriga.shared.topics import EVENT, MEASUREMENT, PLAN, REFERENCE, STATUS
 from quadriga.shared.topics import REFERENCE_EPOCH_MS as EPOCH_MS

@@ -12,9 +12,9 @@ from quadriga.agents.predictor.store import predictor_sha256
 from quadriga.agents.shell import answer_states
 from quadriga.agents.tick_cost import rehearse_in_time
 from quadriga.shared.config.sections import Config
-from quadriga.shared.runtime.blas import use_one_blas_thread
+from quadriga.shared.runtime.arithmetic import use_one_blas_thread
 from quadriga.shared.runtime.clock import monotonic_ns
-from quadriga.shared.runtime.collector import end_collection
+from quadriga.shared.runtime.scheduling import end_collection
 from quadriga.shared.runtime.signals import stop_on_signals
 
 

@@ -30,7 +30,7 @@ from quadriga.agents.predictor.control import DataDrivenController, Deepc
 from quadriga.agents.predictor.four_tank import FourTank, LinearPlant, four_tank
 from quadriga.agents.predictor.plant import PlantPredictor, fit
 from quadriga.shared.robots.conventions import Array
-from quadriga.shared.runtime.blas import use_one_blas_thread
+from quadriga.shared.runtime.arithmetic import use_one_blas_thread
 from quadriga.shared.runtime.clock import monotonic
 
 NOISE: Final = 0.002  # of the published example

@@ -23,8 +23,7 @@ from quadriga.shared.errors import ProcessError
 from quadriga.shared.members import plant_name
 from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.runtime.clock import sleep
-from quadriga.shared.runtime.collector import end_collection
-from quadriga.shared.runtime.scheduling import leave_priority, take_priority
+from quadriga.shared.runtime.scheduling import end_collection, leave_priority, take_priority
 from quadriga.shared.runtime.signals import interruptible, stop_on_signals
 from quadriga.shared.topics import COMMAND
 

@@ -21,7 +21,7 @@ from quadriga.progress import build_progress
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import config_sha256
 from quadriga.shared.errors import PredictorError, QuadrigaError
-from quadriga.shared.runtime.blas import use_one_blas_thread
+from quadriga.shared.runtime.arithmetic import use_one_blas_thread
 
 
 def ensure_predictor(config: Config, console: Console) -> Path:

@@ -40,13 +40,20 @@ class StopFlag:
 def stop_on_signals() -> StopFlag:
     """A flag that SIGINT and SIGTERM set from now on, instead of ending the process at once."""
     flag = StopFlag()
-
-    def handle(_number: int, _frame: FrameType | None) -> None:
-        flag.set()
-
     for number in _STOPS:
-        signal.signal(number, handle)
+        signal.signal(number, lambda _number, _frame: flag.set())
     return flag
+
+
+@contextmanager
+def _handled(handle: Callable[[int, FrameType | None], object]) -> Iterator[None]:
+    """Within the block `handle` is called with SIGINT and SIGTERM, which reach the main thread."""
+    before = {number: signal.signal(number, handle) for number in _STOPS}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _is_main_thread() -> bool:
@@ -55,19 +62,13 @@ def _is_main_thread() -> bool:
 
 @contextmanager
 def stop_flag() -> Iterator[StopFlag]:
-    """`stop_on_signals` for the time of a `with` block.
-
-    Signals reach the main thread alone: the flag of another one is never set.
-    """
+    """A flag that SIGINT and SIGTERM set within the block; never that of another thread."""
+    flag = StopFlag()
     if not _is_main_thread():
-        yield StopFlag()
+        yield flag
         return
-    before = {number: signal.getsignal(number) for number in _STOPS}
-    try:
-        yield stop_on_signals()
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+    with _handled(lambda _number, _frame: flag.set()):
+        yield flag
 
 
 @contextmanager
@@ -87,14 +88,10 @@ def interruptible(stopped: Callable[[], bool]) -> Iterator[None]:
     if not isinstance(stopped, StopFlag):
         yield
         return
-    before = {number: signal.signal(number, _interrupt) for number in _STOPS}
-    try:
+    with _handled(_interrupt):
         if stopped():
             raise KeyboardInterrupt
         yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def interrupt_on_sigterm() -> None:
@@ -195,16 +192,13 @@ def interrupts_held() -> Iterator[None]:
         yield
         return
     noted: list[int] = []
-    handlers = {
-        number: signal.signal(number, lambda received, _frame: noted.append(received))
-        for number in _STOPS
-    }
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
-        yield
+        with _handled(lambda received, _frame: noted.append(received)):
+            before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+            try:
+                yield
+            finally:
+                signal.pthread_sigmask(signal.SIG_SETMASK, before)
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        for number, handler in handlers.items():
-            signal.signal(number, handler)
         if noted:
             signal.raise_signal(noted[0])

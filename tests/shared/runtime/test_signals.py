@@ -29,16 +29,6 @@ input()
 """
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_signals_raise_the_flag_for_a_while(number: signal.Signals) -> None:
-    before = signal.getsignal(number)
-    with stop_flag() as stopped:
-        assert not stopped()
-        os.kill(os.getpid(), number)
-        assert stopped()
-    assert signal.getsignal(number) is before
-
-
 def wait_after(number: signal.Signals) -> None:
     os.kill(os.getpid(), number)
     sleep(60.0)
@@ -46,6 +36,7 @@ def wait_after(number: signal.Signals) -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_stop_ends_at_once_what_looks_at_no_flag(number: signal.Signals) -> None:
+    before = signal.getsignal(number)
     with stop_flag() as stopped:
         with pytest.raises(KeyboardInterrupt), interruptible(stopped):
             wait_after(number)
@@ -54,6 +45,7 @@ def test_a_stop_ends_at_once_what_looks_at_no_flag(number: signal.Signals) -> No
         assert stopped(), "and after it the flag is raised as before"
         with pytest.raises(KeyboardInterrupt), interruptible(stopped):
             pytest.fail("a stop that has come before the block")
+    assert signal.getsignal(number) is before
 
 
 def test_a_flag_of_another_kind_is_asked_before_the_block() -> None:
