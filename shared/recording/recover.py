@@ -16,7 +16,7 @@ from mcap import records
 from mcap.opcode import Opcode
 from mcap.writer import MCAP0_MAGIC
 
-from quadriga.shared.errors import NewerRecordingError, RecordingError, name_file_errors
+from quadriga.shared.errors import RecordingError, name_file_errors
 from quadriga.shared.recording.metadata import PROFILE, unseal
 from quadriga.shared.recording.reader import (
     CORRUPT,
@@ -77,8 +77,8 @@ class DamagedRecording:
         """Open a file.
 
         Raises:
-            RecordingError: no such file, an empty one, one in which nothing of a recording of
-                this project is left, or one of a newer format.
+            RecordingError: no such file, an empty one, or one in which nothing of a recording of
+                this project is left.
         """
         self.path = path
         self.damages: list[Damage] = []
@@ -103,17 +103,13 @@ class DamagedRecording:
             )
 
     def entries(self) -> Iterator[ChunkEntry]:
-        """Every message that can be read, in the order of the file.
-
-        Raises:
-            RecordingError: the messages are of a schema later than this version's.
-        """
+        """Every message that can be read, in the order of the file."""
         self.damages = list(self._scanned)
         keys = self._indexed_keys()
         for at, end in self._chunks:
             try:
                 content = content_of(self._file[at + RECORD.size : end])
-                yield from messages_of(content, keys, str(self.path))
+                yield from messages_of(content, keys)
             except CORRUPT as error:  # of another program: its checksum is right
                 self.damages.append(Damage(at, end - at, f"a foreign chunk ({error})"))
         self.damages.sort(key=lambda damage: damage.at)
@@ -185,14 +181,11 @@ class DamagedRecording:
         if record.name != PROFILE:
             self.notes.setdefault(record.name, dict(record.metadata))
             return True
-        try:
+        with suppress(RecordingError):
             values = unseal(record.metadata, str(self.path))
-        except NewerRecordingError:
-            raise
-        except RecordingError:
-            return False
-        self.metadata = self.metadata or values
-        return True
+            self.metadata = self.metadata or values
+            return True
+        return False
 
     def _indexed_keys(self) -> dict[int, str | None]:
         """Keys by channel from the index at the file's end, if that is intact."""
@@ -202,6 +195,6 @@ class DamagedRecording:
             footer = records.Footer.read(stream(file[end - 20 : end]))
             start = footer.summary_start
             if 0 < start < end and zlib.crc32(file[start : end - 4]) == footer.summary_crc:
-                for _ in messages_of(file[start : end - 20 - RECORD.size], keys, str(self.path)):
+                for _ in messages_of(file[start : end - 20 - RECORD.size], keys):
                     pass
         return keys

@@ -23,9 +23,7 @@ from quadriga.shared.runtime.places import SOURCE, cache_dir
 
 _PACKAGES: Final = ("agents", "bridges", "plant", "shared", "sim_server")
 _MARK: Final = "\n@compiled"
-_IMPORT: Final = re.compile(
-    r"^[ \t]*(?:from|import) (\w+\.[\w.]+)(?: import (\([^)]*\)|.*))?", re.M
-)
+_IMPORT: Final = re.compile(r"^[ \t]*(?:from|import) (\w[\w.]*)(?: import (\([^)]*\)|.*))?", re.M)
 _CHOICE: Final = re.compile(r"""\bimport_module\(f["']([\w.]+)\.\{""")
 REHEARSED: Final = "rehearsed"  # a file beside the machine code of all that an agent runs
 _BYTES: Final = 100_000_000  # that all machine code takes, at most
