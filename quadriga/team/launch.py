@@ -19,8 +19,7 @@ from quadriga.shared.members import LAST, LEADS, OPERATOR, RECORDER, ROUTER, SIM
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.runtime.installed import PYTHON
 from quadriga.shared.runtime.scheduling import valid_priority
-from quadriga.team.fork_server import Fork
-from quadriga.team.forked import ForkedProcess, expect_forks, start_forked
+from quadriga.team.fork_server import Fork, ForkedProcess, expect_forks, start_forked
 
 _ONE_THREAD: Final = (
     "OMP_NUM_THREADS",
@@ -144,8 +143,8 @@ class Launch:
         """Start the project's own processes, if they are several, out of one, or none."""
         if len(rows) < _SEVERAL:
             return
-        forks = [Fork(_words(row), str(self._log_of(row))) for row in rows]
-        children = start_forked(forks, len(QUADRIGA), _environment())
+        forks = [Fork(_words(row)[len(QUADRIGA) :], str(self._log_of(row))) for row in rows]
+        children = start_forked(forks, _environment())
         self._running |= {row.name: child for row, child in zip(rows, children, strict=False)}
 
     def _start(self, row: ProcessSpec) -> None:

@@ -15,28 +15,32 @@ COUNTS: Final = f"{PROFILE}.counts"  # written at the end: what the writer count
 LOST: Final = f"{PROFILE}.lost"  # by key, messages that did not come
 SINCE: Final = f"{PROFILE}.since"  # by key, tick of its first message
 END: Final = f"{PROFILE}.end"  # code, detail and tick of an end that nobody announced
+_FORMAT: Final = "format"
 _CRC: Final = "crc32"
 
 
 def seal(values: Mapping[str, str]) -> dict[str, str]:
     """`values` as they are stored."""
-    return {**values, _CRC: _checksum(values)}
+    stored = {**values, _FORMAT: "1"}
+    return {**stored, _CRC: _checksum(stored)}
 
 
 def unseal(stored: Mapping[str, str], name: str) -> dict[str, str]:
-    """What `seal` was given.
+    """What `seal` was given; metadata without a trace of a seal are taken as they are.
 
     Raises:
         RecordingError: damaged; `name` is the file's.
     """
     values = dict(stored)
-    if values.pop(_CRC, "") != _checksum(values):
+    sealed = any(mark in repr(stored) for mark in (f"'{_FORMAT}'", _CRC))
+    if sealed and values.pop(_CRC, "") != _checksum(values):
         raise RecordingError(
             name,
             "metadata that fail their checksum",
             "metadata as they were written",
             "a damaged file: `quadriga recover` writes what is readable",
         )
+    values.pop(_FORMAT, None)
     return values
 
 
