@@ -116,7 +116,7 @@ class ForkServer:
         with theirs:
             self._process = subprocess.Popen(
                 (*PYTHON, "-m", __name__, str(os.getpid()), *commands),
-                stdin=theirs,
+                stdin=theirs.fileno(),
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
                 env=environment,
