@@ -32,7 +32,7 @@ _HEAD: Final = re.compile(rb"(?s)[\x01-\x0f\x80-\xff].{4}\0{4}")  # of a record 
 # A chunk's record: opcode, length, first and last log time, size, checksum, packing, packed size.
 _CHUNK: Final = struct.Struct("<BQQQQI")
 _KEPT: Final = re.compile(  # what a chunk or metadata begins with
-    rb"\x06.{8}.{28}(?:\0{4}|\x03\0{3}lz4|\x04\0{3}zstd)|\x0c.{4}\0{4}", re.DOTALL
+    rb"\x06.{4}\0{4}.{28}(?:\0{4}|\x03\0{3}lz4|\x04\0{3}zstd)|\x0c.{4}\0{4}", re.DOTALL
 )
 _HEADER: Final = 64  # bytes within which a file's header names the program that wrote it
 _CUT: Final = "the file ends in the middle"
@@ -132,26 +132,25 @@ class DamagedRecording:
     def _end_of(self, at: int) -> int:
         """End of the intact record at a byte, 0 if there is none."""
         file = self._file
-        if file[at] == Opcode.CHUNK:
-            end = self._end_of_chunk(at)
-            with suppress(*CORRUPT):
-                return end if end and content_of(file[at + RECORD.size : end]) else 0
-            return 0
         if not _HEAD.match(file, at):
             return 0
         end = at + RECORD.size + int(RECORD.unpack_from(file, at)[1])
-        if file[at] == Opcode.METADATA:
-            with suppress(*CORRUPT):
-                record = records.Metadata.read(stream(file[at + RECORD.size : end]))
-                return end if self._is_head(end) and self._keep(record) else 0
-            return 0
-        return end if self._is_head(end) else 0
+        content = file[at + RECORD.size : end]
+        with suppress(*CORRUPT):
+            if file[at] == Opcode.CHUNK:
+                return end if content_of(content) else 0
+            if not self._is_head(end):
+                return 0
+            if file[at] == Opcode.METADATA:
+                return end if self._keep(records.Metadata.read(stream(content))) else 0
+            return end
+        return 0
 
     def _pass_damage(self, at: int, done: int) -> int:
         """Where the next record may begin after a byte at which none that is intact does."""
         file, what, times = self._file, "no record begins here", None
-        end = self._end_of_chunk(at) if file[at] == Opcode.CHUNK else 0
-        if end and self._is_head(end):
+        end = at + RECORD.size + int.from_bytes(file[at + 1 : at + RECORD.size], "little")
+        if file[at] == Opcode.CHUNK and end < done and self._is_head(end):
             what, times = "a chunk that fails its checksum", _CHUNK.unpack_from(file, at)[2:4]
         else:
             starts = (found.start() for found in _KEPT.finditer(file, at + 1))
@@ -165,16 +164,6 @@ class DamagedRecording:
         """Whether a record, or the end of the file, may be at a byte."""
         rest = self._file[at : at + RECORD.size]
         return rest in (b"", MCAP0_MAGIC) or _HEAD.fullmatch(rest) is not None
-
-    def _end_of_chunk(self, at: int) -> int:
-        """End of the chunk at a byte, by the size of what is packed in it; 0 if that cannot be."""
-        file, begin = self._file, at + _CHUNK.size
-        packing = int.from_bytes(file[begin : begin + 4], "little")
-        begin += 4 + packing
-        if packing > len("zstd") or begin + 8 > len(file):
-            return 0
-        end = begin + 8 + int.from_bytes(file[begin : begin + 8], "little")
-        return end if end <= len(file) else 0
 
     def _keep(self, record: records.Metadata) -> bool:
         """Keep metadata; False if they are damaged."""

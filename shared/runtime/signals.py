@@ -9,7 +9,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Final
 
@@ -117,17 +117,6 @@ def interrupt_on_sigterm() -> None:
     signal.pthread_sigmask(signal.SIG_UNBLOCK, _STOPS)
 
 
-def take_due_interrupt() -> bool:
-    """Whether an interrupt that came at a bad moment was still to be tried again; now it is not.
-
-    A library that loses one while it calls back may fail at once for want of what that should
-    have done, before the interrupt is tried again: its error is none.
-    """
-    due = signal.getitimer(signal.ITIMER_REAL)[0] > 0.0
-    signal.setitimer(signal.ITIMER_REAL, 0.0)
-    return due
-
-
 def _interrupt(_number: int, frame: FrameType | None) -> None:
     """Raise KeyboardInterrupt, or try again in a while if a module is being imported."""
     while frame is not None:
@@ -159,23 +148,18 @@ def kill_if_orphaned(parent: int, patience: float = _PATIENCE) -> None:
         parent: the process that started this one, as it said.
         patience: how long this process may outlive it, s.
     """
-    threading.Thread(target=_outlive, args=(parent, patience), daemon=True).start()
 
+    def outlive() -> None:
+        with suppress(ProcessLookupError):  # it is gone already
+            ended = os.pidfd_open(parent)
+            if os.getppid() == parent:
+                select.select([ended], [], [])  # without a wake-up
+        sleep(patience)
+        said = f"killed {patience:g} s after process {parent}, which had started this one"
+        print(f"quadriga: {said}", file=sys.stderr, flush=True)
+        os.kill(os.getpid(), signal.SIGKILL)
 
-def _outlive(parent: int, patience: float) -> None:
-    """Wait without a wake-up until the parent is gone; some time later kill this process."""
-    try:
-        ended = os.pidfd_open(parent)
-    except ProcessLookupError:
-        ended = -1  # gone already
-    except OSError:
-        return  # a system that cannot tell: SIGTERM must do
-    if ended >= 0 and os.getppid() == parent:
-        select.select([ended], [], [])
-    sleep(patience)
-    said = f"quadriga: killed {patience:g} s after process {parent}, which had started this one\n"
-    print(said, end="", file=sys.stderr, flush=True)
-    os.kill(os.getpid(), signal.SIGKILL)
+    threading.Thread(target=outlive, daemon=True).start()
 
 
 @contextmanager

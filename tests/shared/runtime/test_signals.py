@@ -48,13 +48,6 @@ def test_a_stop_ends_at_once_what_looks_at_no_flag(number: signal.Signals) -> No
     assert signal.getsignal(number) is before
 
 
-def test_a_flag_of_another_kind_is_asked_before_the_block() -> None:
-    with interruptible(lambda: False):
-        pass
-    with pytest.raises(KeyboardInterrupt), interruptible(lambda: True):
-        pytest.fail("it was to stop before")
-
-
 def alive(pid: int) -> bool:
     try:
         with open(f"/proc/{pid}/stat") as stat:
@@ -166,7 +159,6 @@ def called():
 called()
 ready = True
 """
-FAILS_THEN = CALLS_BACK.replace("ready = True", "raise RuntimeError('what it should have done')")
 PROGRAM = """
 import sys
 folder, how = sys.argv[1:]
@@ -192,13 +184,9 @@ sys.exit(main())
 
 
 @pytest.mark.parametrize(
-    ("library", "how", "gone_on"),
-    [(LIBRARY, "import", "gone on\n"), (CALLS_BACK, "run", "gone on\n"), (FAILS_THEN, "run", "")],
-    ids=["import", "callback", "callback that was needed"],
+    ("library", "how"), [(LIBRARY, "import"), (CALLS_BACK, "run")], ids=["import", "callback"]
 )
-def test_an_interrupt_at_a_bad_moment_is_one_line(
-    tmp_path: Path, library: str, how: str, gone_on: str
-) -> None:
+def test_an_interrupt_at_a_bad_moment_is_one_line(tmp_path: Path, library: str, how: str) -> None:
     """As a library in C does, this one makes an error of its own of it, or Python loses it."""
     (tmp_path / "library.py").write_text(library, encoding="utf-8")
     done = subprocess.run(
@@ -209,4 +197,4 @@ def test_an_interrupt_at_a_bad_moment_is_one_line(
         check=False,
     )
     assert (done.returncode, done.stderr) == (130, "quadriga: interrupted\n")
-    assert done.stdout == gone_on
+    assert done.stdout == "gone on\n"
