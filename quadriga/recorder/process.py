@@ -18,7 +18,7 @@ from quadriga.shared.bus.liveness import loss_error
 from quadriga.shared.bus.session import HERE, READY, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
-from quadriga.shared.errors import ProcessError, RecordingError, system_reason
+from quadriga.shared.errors import BusError, ProcessError, RecordingError, system_reason
 from quadriga.shared.members import RECORDER, has_lead
 from quadriga.shared.recording.metadata import END
 from quadriga.shared.recording.quota import LARGEST, Quota
@@ -191,4 +191,9 @@ def _join(bus: Bus, config: Config, stopped: Callable[[], bool], me: ProcessInfo
     walking, doubled = has_lead(bus.members_at(READY)), RECORDER in bus.members_at(HERE)
     if walking or doubled or not config.recorder.enabled:
         return LATE
-    return MEMBER if join(bus, config, stopped, me) else ""
+    try:
+        return MEMBER if join(bus, config, stopped, me) else ""
+    except BusError:
+        if not has_lead(bus.members_at(READY)):
+            raise
+        return LATE  # a busy machine has let it know late that the team walks

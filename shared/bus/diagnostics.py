@@ -113,31 +113,16 @@ class Diagnosis:
     remedy: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class TeamNorm:
-    """What all must agree with.
-
-    Attributes:
-        lead: what the process that drives the team's time says of itself.
-        predictor: digest of the predictor of the first process that plans; "": unknown.
-        planner: the name of that process.
-    """
+class TeamNorm(NamedTuple):
+    """What all must agree with: who drives the team's time, and the first process that plans."""
 
     lead: About
-    predictor: str = ""
+    predictor: str = ""  # its digest; "": unknown
     planner: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Disagreement:
-    """In what one process differs.
-
-    Attributes:
-        of: a key of `REMEDIES`; no team walks with those of `DECISIVE`.
-        got: what it has.
-        wanted: what it should have.
-        owner: the process that has this.
-    """
+class Disagreement(NamedTuple):
+    """In what one process differs: a key of `REMEDIES`, what it has, and what the owner has."""
 
     of: str
     got: str

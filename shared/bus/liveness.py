@@ -45,12 +45,9 @@ def find_loss(bus: Bus, config: Config) -> Loss | None:
 
 
 def loss_error(loss: Loss, tick: int, missed_ns: int = 0) -> ProcessError:
-    """The error of a process that ends because of a loss.
+    """The error of a process that ends because of a loss at a tick, ms.
 
-    Args:
-        loss: what has vanished.
-        tick: the team's time as far as this process knows it, ms.
-        missed_ns: when it was missed first, ns since 1970; 0: that is not known.
+    `missed_ns` is when it was missed first, ns since 1970; 0: that is not known.
     """
     cause = "killed, failed, or cut off: see what it says itself"
     if loss.code == LINK_LOST:
