@@ -23,6 +23,7 @@ DIFFERS: Final = "other-"  # and what: `other-configuration`
 CLOCK_OFF: Final = "clock-off"
 NOT_REALTIME: Final = "not-realtime"
 
+RECEIVE_BUFFER: Final = 4 << 20  # bytes, of each link's socket
 CLOCK_LIMIT: Final = 0.1  # s, by which system clocks may differ: recordings are read by them
 PACE_LIMIT: Final = 1e-3  # s, by which those of plants may that pace their robots by them
 CLOCK_REMEDY: Final = "keep the clocks of all computers by PTP (ptp4l, phc2sys) or chrony"

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
+from quadriga.shared.bus.diagnostics import RECEIVE_BUFFER
 from quadriga.shared.config.endpoints import check_exposure, check_port, host_and_port, is_tls
 from quadriga.shared.config.sections import BusConfig
 from quadriga.shared.errors import BusError, ConfigError, QuadrigaError
@@ -15,7 +16,6 @@ from quadriga.shared.members import LEADS, ROUTER
 
 NO_LINK: Final = "Unable to connect"  # how Zenoh says that nobody answers at an endpoint
 LEASE_MS: Final = 10_000  # of silence after which a link is given up: its process stands still
-RECEIVE_BUFFER: Final = 4 << 20  # bytes, of each link's socket
 # The others may start before the plant or the router: keep trying in the background.
 _RETRY: Final = {"period_init_ms": 20, "period_max_ms": 200, "period_increase_factor": 1.5}
 _COMMON: Final = {
