@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 import os
-import shutil
 import signal
-import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -155,35 +151,6 @@ def test_nobody_is_started_twice(tmp_path: Path) -> None:
             running.restart("r9")
 
 
-def test_the_log_of_who_floods_it_is_cut(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(launch, "_LARGEST_LOG", 1 << 20)
-    code = """
-import os
-size = 0
-while (now := os.fstat(1).st_size) >= size:
-    size = now
-    print("flood" * 10_000)
-print("last words")
-"""
-    with Launch([row("sim", code)], tmp_path) as running:
-        running.watch(never)
-    text = (tmp_path / "sim.log").read_text()
-    assert text.startswith("flood" * 10_000)
-    assert "cut)\n" in text
-    assert "last words\n" in text
-
-
-def test_a_folder_that_is_deleted_while_the_team_walks_is_named(tmp_path: Path) -> None:
-    def delete() -> bool:
-        shutil.rmtree(tmp_path / "logs")
-        return False
-
-    match = r"logs: got a folder that was deleted"
-    rows = [row("sim", LAST)]
-    with Launch(rows, tmp_path / "logs") as running, pytest.raises(ProcessError, match=match):
-        running.watch(delete)
-
-
 def test_the_table_starts_everyone_once_and_stops_the_recorder_last() -> None:
     rows = process_table(load(None, {"team.robots": 2}), Path("run"), Path("fitted.npz"), "abc")
     assert [row.name for row in rows] == ["sim", "r1", "r2", "operator", "recorder"]
@@ -193,30 +160,3 @@ def test_the_table_starts_everyone_once_and_stops_the_recorder_last() -> None:
     alone = process_table(load(None, {"recorder.enabled": False}), Path("run"), None, "")
     assert "recorder" not in [row.name for row in alone]
     assert "--predictor" not in alone[1].command
-
-
-@pytest.fixture
-def full_disk(tmp_path: Path) -> Iterator[Path]:
-    """A folder on a disk of its own on which nothing more can be written."""
-    folder = tmp_path / "disk"
-    folder.mkdir()
-    made = subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(folder)],
-        capture_output=True,
-        check=False,
-    )
-    if made.returncode:
-        pytest.skip("disks are mounted by root alone")
-    (folder / "sim.log").touch()
-    with suppress(OSError), (folder / "filled").open("wb", buffering=0) as file:
-        while True:
-            file.write(bytes(4096))
-    yield folder
-    subprocess.run(["umount", str(folder)], check=True)
-
-
-def test_a_process_that_could_not_say_that_the_disk_is_full_is_spoken_for(full_disk: Path) -> None:
-    code = "import sys; print('the recording cannot be written'); sys.exit(2)"
-    match = r"process sim: got exit status \d+, expected .*\n  \(none: the disk is full\)"
-    with Launch([row("sim", code)], full_disk) as running, pytest.raises(ProcessError, match=match):
-        running.watch(never)
