@@ -19,6 +19,14 @@ NOTE: Final = "note"  # worth knowing, and nothing is wrong
 BAD: Final = "bad"
 UNKNOWN: Final = "unknown"  # it could not be looked at
 
+NOT_STARTED: Final = "not-started"
+NO_LINK: Final = "no-link"
+NOT_ANSWERING: Final = "not-answering"
+FOREIGN: Final = "foreign"
+NOT_REACHABLE: Final = "not-reachable"
+UNREADABLE: Final = "unreadable"
+TWO_OF_A_NAME: Final = "two-of-a-name"
+NOT_SEEN: Final = "not-seen"
 DIFFERS: Final = "other-"  # and what: `other-configuration`
 CLOCK_OFF: Final = "clock-off"
 NOT_REALTIME: Final = "not-realtime"
@@ -263,27 +271,27 @@ def _explain_silence(member: Member, view: TeamView) -> Diagnosis:
     if view.answers.get(name):
         text = "says what this version cannot read"
         cause = "another version of quadriga: install the same one"
-        return Diagnosis("unreadable", BAD, text, cause)
+        return Diagnosis(UNREADABLE, BAD, text, cause)
     if name in view.here:
         if member.foreign:
             text = "here, a controller of one's own that answers nothing"
-            return Diagnosis("foreign", NOTE, text)
+            return Diagnosis(FOREIGN, NOTE, text)
         cause = "frozen or overloaded, or an earlier version of quadriga: see its log, restart it"
-        return Diagnosis("not-answering", BAD, "here, but does not answer", cause)
+        return Diagnosis(NOT_ANSWERING, BAD, "here, but does not answer", cause)
     witnesses = sorted(
         other for other in view.answers if (said := view.about(other)) and name in said.sees
     )
     if witnesses:
         text = f"seen by {', '.join(witnesses)}, but not from here"
         cause = "frozen, or in peer mode its bus.listen cannot be reached from here"
-        return Diagnosis("not-reachable", BAD, text, cause)
+        return Diagnosis(NOT_REACHABLE, BAD, text, cause)
     if not view.linked:
-        return Diagnosis("no-link", BAD, "no link to anyone")  # the way there is another matter
+        return Diagnosis(NO_LINK, BAD, "no link to anyone")  # the way there is another matter
     text = "not on the bus: not started, failed, or another bus.endpoint or team.name"
     robot = f" --robot {member.robot}" if member.robot else ""
     real = ", of a real robot `bridge`" if member.role.name == SIM else ""
     command = f"`quadriga {member.role.command}{robot}`{real}"
-    return Diagnosis("not-started", BAD, text, f"start it ({command}), or look at what it said")
+    return Diagnosis(NOT_STARTED, BAD, text, f"start it ({command}), or look at what it said")
 
 
 def _two_of_a_name(name: str, view: TeamView) -> Iterator[Diagnosis]:
@@ -292,7 +300,7 @@ def _two_of_a_name(name: str, view: TeamView) -> Iterator[Diagnosis]:
     if name in view.doubled or len(announced) > 1:
         where = " and ".join(f"{about.host}:{about.pid}" for about in announced)
         text = f"two processes of this name{f', {where}' if len(announced) > 1 else ''}"
-        yield Diagnosis("two-of-a-name", BAD, text, "stop one, or give one team another name")
+        yield Diagnosis(TWO_OF_A_NAME, BAD, text, "stop one, or give one team another name")
 
 
 def _explain_stage(about: About, view: TeamView) -> Iterator[Diagnosis]:
@@ -304,7 +312,7 @@ def _explain_stage(about: About, view: TeamView) -> Iterator[Diagnosis]:
     unseen = sorted(missed & view.here)
     if about.stage != STARTED and unseen:
         cause = "in peer mode bus.listen of each must be reachable for all others; a firewall?"
-        yield Diagnosis("not-seen", BAD, f"does not see {', '.join(unseen)}", cause)
+        yield Diagnosis(NOT_SEEN, BAD, f"does not see {', '.join(unseen)}", cause)
     if about.scheduling == NOT_GRANTED:
         cause = "permit it: LimitRTPRIO=1 in its unit, or rtprio 1 in /etc/security/limits.d"
         yield Diagnosis(NOT_REALTIME, BAD, "has no real-time scheduling", cause)
