@@ -15,9 +15,8 @@ from quadriga.agents.planning.team import Central, CentralOutputs, CentralState
 from quadriga.agents.plausibility import is_within_limits
 from quadriga.agents.rehearsal import rehearse_central
 from quadriga.agents.time_grid import step_ms
-from quadriga.shared.bus.discovery import join
+from quadriga.shared.bus.discovery import ProcessInfo, join
 from quadriga.shared.bus.liveness import Liveness
-from quadriga.shared.bus.process_info import ProcessInfo
 from quadriga.shared.bus.session import POLL, READY, Bus
 from quadriga.shared.codec import decode, encode
 from quadriga.shared.codes import code_of
@@ -26,10 +25,9 @@ from quadriga.shared.errors import MessageError
 from quadriga.shared.members import PLANNER
 from quadriga.shared.messages import Event, Measurement, Reference, Status
 from quadriga.shared.robots.conventions import robot_names
-from quadriga.shared.runtime.blas import use_one_blas_thread
+from quadriga.shared.runtime.arithmetic import use_one_blas_thread
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns
-from quadriga.shared.runtime.collector import end_collection
-from quadriga.shared.runtime.scheduling import at_work
+from quadriga.shared.runtime.scheduling import at_work, end_collection
 from quadriga.shared.runtime.signals import interruptible, stop_on_signals
 from quadriga.shared.topics import EVENT, MEASUREMENT, PLAN, REFERENCE, STATUS
 from quadriga.shared.topics import REFERENCE_EPOCH_MS as EPOCH_MS

@@ -12,13 +12,12 @@ from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.predictor.store import predictor_sha256
 from quadriga.agents.rehearsal import rehearse
 from quadriga.agents.shell import answer_states
-from quadriga.shared.bus.endpoint import is_loopback
+from quadriga.shared.config.endpoints import is_loopback
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ProcessError
-from quadriga.shared.runtime.blas import use_one_blas_thread
+from quadriga.shared.runtime.arithmetic import use_one_blas_thread
 from quadriga.shared.runtime.clock import monotonic_ns, thread_ns
-from quadriga.shared.runtime.collector import end_collection
-from quadriga.shared.runtime.scheduling import count_cores
+from quadriga.shared.runtime.scheduling import count_cores, end_collection
 from quadriga.shared.runtime.signals import stop_on_signals
 
 _TICKS: Final = 200  # the last ones of a rehearsal: all that is loaded or compiled has been

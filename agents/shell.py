@@ -11,9 +11,8 @@ from quadriga.agents.modes import change_event
 from quadriga.agents.planning.interface import NOTHING, Expected
 from quadriga.agents.step_io import Inputs, Outputs
 from quadriga.agents.telemetry import Telemetry
-from quadriga.shared.bus.discovery import join
+from quadriga.shared.bus.discovery import ProcessInfo, join
 from quadriga.shared.bus.liveness import Liveness
-from quadriga.shared.bus.process_info import ProcessInfo
 from quadriga.shared.bus.session import HERE, POLL, READY, Bus
 from quadriga.shared.codec import encode
 from quadriga.shared.config.sections import Config

@@ -25,7 +25,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.messages import State
 from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.clock import monotonic_ns
-from quadriga.shared.runtime.collector import collector_off
+from quadriga.shared.runtime.scheduling import collector_off
 
 STAGES: Final = ("decode", "estimate", "gait, plan", "control", "encode")
 _L2: Final = Path("/sys/devices/system/cpu/cpu0/cache/index2/size")

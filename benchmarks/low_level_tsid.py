@@ -28,8 +28,8 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.robots.a1 import A1
 from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.clock import monotonic_ns
-from quadriga.shared.runtime.collector import collector_off
 from quadriga.shared.runtime.jit import compiled
+from quadriga.shared.runtime.scheduling import collector_off
 
 
 def cases(config: Config, predictor: Predictor | None, ticks: list[AgentTick]) -> list[TsidCase]:

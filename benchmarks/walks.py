@@ -20,7 +20,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.messages import Truth
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns
-from quadriga.shared.runtime.collector import collector_off
+from quadriga.shared.runtime.scheduling import collector_off
 from quadriga.shared.topics import TRUTH
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import Launch, process_table

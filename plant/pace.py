@@ -11,10 +11,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from quadriga.shared.bus.diagnostics import CLOCK_REMEDY, PACE_LIMIT, ClockOffset
-from quadriga.shared.bus.discovery import ask, ask_clock, start_together
-from quadriga.shared.bus.membership import lead
-from quadriga.shared.bus.process_info import ProcessInfo
+from quadriga.shared.bus.diagnostics import CLOCK_REMEDY, PACE_LIMIT, ClockOffset, lead
+from quadriga.shared.bus.discovery import ProcessInfo, ask, ask_clock, start_together
 from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError

@@ -14,17 +14,15 @@ from quadriga.plant.requests import subscribe_estops, subscribe_requests
 from quadriga.plant.server import PlantServer
 from quadriga.plant.team_time import team_time
 from quadriga.shared import codes
-from quadriga.shared.bus.discovery import await_agents, join, start_together
+from quadriga.shared.bus.discovery import ProcessInfo, await_agents, join, start_together
 from quadriga.shared.bus.liveness import Loss, loss_error
-from quadriga.shared.bus.process_info import ProcessInfo
 from quadriga.shared.bus.session import Bus
 from quadriga.shared.config.sections import BRIDGED, Config
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.members import plant_name
 from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic, sleep
-from quadriga.shared.runtime.collector import end_collection
-from quadriga.shared.runtime.scheduling import leave_priority, take_priority
+from quadriga.shared.runtime.scheduling import end_collection, leave_priority, take_priority
 from quadriga.shared.runtime.signals import interruptible, stop_on_signals
 from quadriga.shared.topics import COMMAND
 

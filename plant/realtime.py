@@ -59,9 +59,8 @@ def _check_others(server: PlantServer, pace: TeamPace | None) -> None:
         return
     server.time.look(present)
     timeout = server.config.bus.clock_timeout
-    note = server.bus.standstill.note
     if behind := server.time.behind(server.plant.tick - round(1000 * timeout)):
-        server.time.end = plant_gone(sorted(behind), f"silent for {timeout:g} s{note}")
+        server.time.end = plant_gone(sorted(behind), f"silent for {timeout:g} s")
 
 
 class _Motors:

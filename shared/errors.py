@@ -62,10 +62,6 @@ class RecordingError(QuadrigaError):
     """A recording cannot be read or written."""
 
 
-class NewerRecordingError(RecordingError):
-    """A recording that only a later version of this project can read."""
-
-
 class MeshError(QuadrigaError):
     """The URDF of a robot, or a mesh file that it names, is missing or cannot be read."""
 

@@ -6,11 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from threadpoolctl import threadpool_limits
+
 from quadriga.progress import quiet_console
 from quadriga.replay.difference import Difference
 from quadriga.replay.outcome import format_outcome
 from quadriga.replay.team_replay import replay
-from quadriga.shared.runtime.blas import blas_threads_kept
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +51,7 @@ def replay_robot(path: Path, robot: str) -> ReplayResult:
         RecordingError: the recording lacks what a replay needs.
         PredictorError: the predictor that the team walked with is not to be found.
     """
-    with blas_threads_kept():
+    with threadpool_limits():  # BLAS has the caller's number of threads after it
         (outcome,) = replay(path, (robot,), {}, None, None, quiet_console())
     verdict = outcome.verdict
     return ReplayResult(

@@ -98,15 +98,8 @@ class Run:
 
     @cached_property
     def topics(self) -> Mapping[str, int]:
-        """How many messages there are of each key, without the name of the team in it.
-
-        From the recording's index; of one that was cut they are counted.
-        """
-        counts: Mapping[str, int] | None = None
-        if self.complete:
-            counts = self._recording.indexed_counts()
-        if counts is None:
-            counts = Counter(entry.key for entry in self._recording.entries())
+        """How many messages there are of each key, without the name of the team in it."""
+        counts = Counter(entry.key for entry in self._recording.entries())
         own = f"{self.config.team.name}/"
         return {key.removeprefix(own): counts[key] for key in sorted(counts)}
 

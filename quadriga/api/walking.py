@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from threadpoolctl import threadpool_limits
+
 from quadriga.api.configuration import read_layers
 from quadriga.api.run import Run
 from quadriga.progress import quiet_console
@@ -13,7 +15,6 @@ from quadriga.shared.config.load import build
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.recording.metadata import RECORDING
-from quadriga.shared.runtime.blas import blas_threads_kept
 from quadriga.team.endpoint import with_free_endpoint
 from quadriga.team.run_folder import make_run_dir
 from quadriga.team.walk import INTERRUPTED, Report, check_walk
@@ -71,7 +72,7 @@ def walk(
         raise ConfigError("recorder.enabled", "false", "true", cause)
     check_walk(in_force)
     folder = make_run_dir(None) if out is None else Path(out)
-    with blas_threads_kept():
+    with threadpool_limits():  # BLAS has the caller's number of threads after it
         status = walk_team(in_force, folder, report=wanted, console=quiet_console())
     if status == INTERRUPTED:
         raise KeyboardInterrupt

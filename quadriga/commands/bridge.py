@@ -80,8 +80,7 @@ def _restore(config: Config, name: str, controller: str) -> int:
 
 def _test_joints(config: Config, name: str) -> int:
     from quadriga.bridges.joint_test import build_joint_tester, refuse_wrong, table
-    from quadriga.shared.runtime.collector import end_collection
-    from quadriga.shared.runtime.scheduling import take_priority
+    from quadriga.shared.runtime.scheduling import end_collection, take_priority
     from quadriga.shared.runtime.signals import stop_on_signals
 
     stopped = stop_on_signals()

@@ -19,12 +19,7 @@ from quadriga.commands.running import registered
 from quadriga.commands.version import ShowVersion
 from quadriga.shared.errors import ConfigError, ProcessError, QuadrigaError, remedy, system_reason
 from quadriga.shared.printable import printable, printable_line
-from quadriga.shared.runtime.signals import (
-    die_with_parent,
-    interrupt_on_sigterm,
-    kill_if_orphaned,
-    take_due_interrupt,
-)
+from quadriga.shared.runtime.signals import die_with_parent, interrupt_on_sigterm, kill_if_orphaned
 
 FAILED: Final = 1  # a robot fell or a process failed
 WRONG: Final = 2  # the command, the configuration or a file is wrong
@@ -72,7 +67,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     except QuadrigaError as error:
         return _complain(error, WRONG)
     except KeyboardInterrupt:
-        return _say_interrupted()
+        print("quadriga: interrupted", file=sys.stderr)
+        return INTERRUPTED
     except BrokenPipeError:  # of `quadriga config | head`
         sys.stdout = None
         return 0
@@ -81,16 +77,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _complain(
             ConfigError(str(what), reason, "one that can be used", remedy(error)), WRONG
         )
-    except Exception:  # a compiler's, whose callback an interrupt has ended
-        if not take_due_interrupt():
-            raise
-        return _say_interrupted()
     return status
-
-
-def _say_interrupted() -> int:
-    print("quadriga: interrupted", file=sys.stderr)
-    return INTERRUPTED
 
 
 def _parse(parser: CommandLine, typed: Sequence[str]) -> argparse.Namespace:

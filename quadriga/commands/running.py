@@ -13,7 +13,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.members import ROLES
 
 if TYPE_CHECKING:
-    from quadriga.team.running_team import RunningTeam
+    from quadriga.team.registry import RunningTeam
 
 # Commands for a team that runs already.
 _LIVE: Final = frozenset(
@@ -40,8 +40,7 @@ def find_running(arguments: argparse.Namespace, overrides: Mapping[str, Any]) ->
     """
     if not _asks_for_one(arguments) or any(name in overrides for name in _PLACES):
         return None
-    from quadriga.team.registry import running_teams
-    from quadriga.team.running_team import choose_team
+    from quadriga.team.registry import choose_team, running_teams
 
     found = choose_team(running_teams(), str(overrides.get(_NAME, "")))
     if found is not None:

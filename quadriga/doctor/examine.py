@@ -21,13 +21,13 @@ from quadriga.shared.bus.diagnostics import (
     TeamView,
     diagnose,
     disagreements,
+    members,
+    processes,
 )
-from quadriga.shared.bus.discovery import ask, ask_clock, view_of
-from quadriga.shared.bus.endpoint import OPEN, REFUSED, UNTRIED, Reach, is_loopback, try_endpoint
-from quadriga.shared.bus.membership import members, processes
-from quadriga.shared.bus.process_info import describe_process
+from quadriga.shared.bus.discovery import ask, ask_clock, describe_process, view_of
 from quadriga.shared.bus.session import HERE, Bus, pause
-from quadriga.shared.config.endpoints import is_tls
+from quadriga.shared.bus.settings import OPEN, REFUSED, UNTRIED, Reach, try_endpoint
+from quadriga.shared.config.endpoints import is_loopback, is_tls
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError, ConfigError
 from quadriga.shared.members import DOCTOR, SIM, Member

@@ -13,11 +13,11 @@ from quadriga.shared.bus.diagnostics import (
     CLOCK_REMEDY,
     GOOD,
     NOTE,
+    RECEIVE_BUFFER,
     UNKNOWN,
     Diagnosis,
+    processes,
 )
-from quadriga.shared.bus.membership import processes
-from quadriga.shared.bus.settings import RECEIVE_BUFFER
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import OPERATOR, RECORDER
 

@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Final
 
 from quadriga.doctor.health import Health, judge_team
-from quadriga.shared.bus.discovery import ask, view_of
-from quadriga.shared.bus.membership import processes
-from quadriga.shared.bus.process_info import describe_process
+from quadriga.shared.bus.diagnostics import processes
+from quadriga.shared.bus.discovery import ask, describe_process, view_of
 from quadriga.shared.bus.session import POLL, READY, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError, name_file_errors

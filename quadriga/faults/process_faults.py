@@ -16,7 +16,6 @@ from quadriga.shared.members import OPERATOR, RECORDER, ROUTER, SIM
 from quadriga.shared.runtime.clock import monotonic, sleep
 
 _FULL_S: Final = 6.0  # world time that is walked after it
-_RECONNECT_S: Final = 3.0  # for which a router is waited for that does not come back
 _PAUSE_S: Final = 0.3  # of a process that stands still for a while
 
 _Signals: TypeAlias = tuple[tuple[signal.Signals, float], ...]
@@ -51,9 +50,9 @@ def _stage(process: str, signals: _Signals) -> SetStage:
 
     @contextmanager
     def stage(config: Config, draw: Draw, _folder: Path) -> Iterator[Stage]:
-        # A router that nobody replaces is waited for in vain; and who stands still behind a router
-        # might hold it up, but only once all that lies between them is full.
-        bus = replace(config.bus, mode="client", reconnect_timeout=_RECONNECT_S)
+        # Who stands still behind a router might hold it up, but only once all that lies between
+        # them is full.
+        bus = replace(config.bus, mode="client")
         seconds = max(config.world.duration, 1e-3 * draw.tick + _FULL_S)
         world = replace(config.world, duration=seconds)
         yield Stage(replace(config, bus=bus, world=world), strike, lasts=lasts)

@@ -21,7 +21,7 @@ import numpy as np
 from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.arithmetic import arithmetic_digest
 from quadriga.shared.runtime.atomic import write_text
-from quadriga.shared.runtime.imports import followed_files
+from quadriga.shared.runtime.jit_cache import followed_files
 from quadriga.shared.runtime.places import SOURCE, cache_dir
 
 _LIBRARIES: Final = (

@@ -10,7 +10,7 @@ from quadriga.identification.cache import data_path
 from quadriga.identification.dataset import read_data
 from quadriga.shared.config.sections import Config
 from quadriga.shared.planner_kinds import find_kind, load_builder
-from quadriga.shared.runtime.blas import use_one_blas_thread
+from quadriga.shared.runtime.arithmetic import use_one_blas_thread
 
 
 def build_central_planner(

@@ -23,7 +23,7 @@ from quadriga.progress import build_progress
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import config_sha256
 from quadriga.shared.errors import PredictorError, PredictorFileError, QuadrigaError
-from quadriga.shared.runtime.blas import use_one_blas_thread
+from quadriga.shared.runtime.arithmetic import use_one_blas_thread
 from quadriga.shared.runtime.clock import monotonic
 
 # What a true response depends on beside the controller: of a predictor's meta, and sections.

@@ -21,7 +21,7 @@ from quadriga.shared.errors import ConfigError
 from quadriga.shared.members import PLANNER
 from quadriga.shared.messages import Event, Measurement, Plan, Reference
 from quadriga.shared.robots.conventions import Array, robot_names
-from quadriga.shared.runtime.blas import use_one_blas_thread
+from quadriga.shared.runtime.arithmetic import use_one_blas_thread
 from quadriga.sim_server.world.world import World
 
 Plans = tuple[tuple[str, Plan], ...]

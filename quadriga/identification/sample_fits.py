@@ -17,7 +17,7 @@ from quadriga.identification.behaviour import numbers
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robots.conventions import N_FORCES, N_OUTPUTS, Array
-from quadriga.shared.runtime.blas import use_one_blas_thread
+from quadriga.shared.runtime.arithmetic import use_one_blas_thread
 
 _ROBOTS: Final = 3
 _SAMPLES: Final = 400  # of an episode

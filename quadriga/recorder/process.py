@@ -11,14 +11,13 @@ from quadriga.recorder.parts import Parts
 from quadriga.recorder.selection import KeyFilter, Selection
 from quadriga.recorder.session import Session
 from quadriga.recordings.metadata import build_metadata
-from quadriga.shared.bus.discovery import REJOINS, await_members, join
+from quadriga.shared.bus.diagnostics import members
+from quadriga.shared.bus.discovery import ProcessInfo, await_members, join
 from quadriga.shared.bus.liveness import loss_error
-from quadriga.shared.bus.membership import members
-from quadriga.shared.bus.process_info import ProcessInfo
 from quadriga.shared.bus.session import HERE, READY, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
-from quadriga.shared.errors import ProcessError, RecordingError, system_reason
+from quadriga.shared.errors import BusError, ProcessError, RecordingError, system_reason
 from quadriga.shared.members import RECORDER, has_lead
 from quadriga.shared.recording.metadata import END
 from quadriga.shared.recording.quota import LARGEST, Quota
@@ -154,7 +153,7 @@ def _note_end(parts: Parts, session: Session) -> ProcessError | None:
     if loss is None:
         return None
     tick = max(parts.last_tick(), 0)
-    error = loss_error(loss, tick, session.loss_ns, session.note)
+    error = loss_error(loss, tick, session.loss_ns)
     detail, missed = f"{error.name}: {error.got}", str(session.loss_ns)
     parts.note(END, {"code": loss.code, "detail": detail, "tick": str(tick), "missed_ns": missed})
     return error
@@ -179,8 +178,9 @@ def _join(bus: Bus, config: Config, stopped: Callable[[], bool], me: ProcessInfo
     walking, doubled = has_lead(bus.members_at(READY)), RECORDER in bus.members_at(HERE)
     if walking or doubled or not config.recorder.enabled:
         return LATE
-    joined = join(bus, config, stopped, me, rejoins=True)
-    if joined == REJOINS:  # a busy machine has let it know late that the team walks
-        bus.withdraw()
-        return LATE
-    return MEMBER if joined else ""
+    try:
+        return MEMBER if join(bus, config, stopped, me) else ""
+    except BusError:
+        if not has_lead(bus.members_at(READY)):
+            raise
+        return LATE  # a busy machine has let it know late that the team walks

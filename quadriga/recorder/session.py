@@ -61,7 +61,7 @@ class Session:
         self._ended = self._seen = self._announced = self._drops = False
         self._hurries = config.world.mode == "lockstep"  # then it does from the start
         self._passed_over = SkippedTicks(config)
-        self._losses = LossTimer(lambda: find_loss(bus, config), config, grace=0.0)
+        self._losses = LossTimer(lambda: find_loss(bus, config))
 
     def record(self, *, late: bool, seen: bool) -> None:
         """Record until the end; a late recorder reports what it has once it knows.
@@ -73,13 +73,9 @@ class Session:
         self._seen = seen
         self._say(f"recording team {self._bus.team!r} to {self._parts.paths[0]}")
         self._flushed = self._begun = monotonic()
-        still = self._bus.standstill
-        still.begin()
-        starvation, stood = Starvation(self._begun), still.total
+        starvation = Starvation(self._begun)
         while not (self._stopped() or self._ended):
             self._take(max(0.0, self._flushed + FLUSH - monotonic()))
-            if still.total > stood:  # which no priority would have helped
-                starvation, stood = Starvation(monotonic()), still.total
             if starvation.look(monotonic()):
                 self._hurry()
             if late and monotonic() - self._begun > _LOOK and self._parts.messages:
@@ -130,11 +126,6 @@ class Session:
     def find_unannounced(self) -> Loss | None:
         """What has vanished without an announced end of the walk; None if nothing has."""
         return find_loss(self._bus, self._config) if self._seen and not self._announced else None
-
-    @property
-    def note(self) -> str:
-        """What this process has to say of itself where others are missing."""
-        return self._bus.standstill.note
 
     @property
     def loss_ns(self) -> int:

@@ -24,9 +24,9 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.runtime.blas import use_one_blas_thread
+from quadriga.shared.runtime.arithmetic import use_one_blas_thread
 from quadriga.shared.runtime.clock import monotonic
-from quadriga.shared.runtime.collector import collector_off
+from quadriga.shared.runtime.scheduling import collector_off
 from quadriga.shared.topics import PLAN
 
 _SHOWN_EVERY: Final = 100  # ticks

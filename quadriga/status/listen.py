@@ -11,10 +11,8 @@ from typing import Final
 
 from quadriga.doctor.health import Health, judge_team
 from quadriga.doctor.watch_team import WalkEnd
-from quadriga.shared.bus.diagnostics import TeamView
-from quadriga.shared.bus.discovery import ask, view_of
-from quadriga.shared.bus.membership import processes
-from quadriga.shared.bus.process_info import describe_process
+from quadriga.shared.bus.diagnostics import TeamView, processes
+from quadriga.shared.bus.discovery import ask, describe_process, view_of
 from quadriga.shared.bus.session import HERE, Arrival, Bus
 from quadriga.shared.codec import envelope
 from quadriga.shared.config.sections import Config

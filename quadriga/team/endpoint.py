@@ -10,7 +10,7 @@ from dataclasses import replace
 from hashlib import sha256
 from typing import Any, Final
 
-from quadriga.shared.bus.endpoint import OPEN, try_endpoint
+from quadriga.shared.bus.settings import OPEN, try_endpoint
 from quadriga.shared.config.sections import BusConfig, Config
 from quadriga.shared.errors import ConfigError
 

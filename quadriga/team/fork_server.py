@@ -1,24 +1,30 @@
-"""Program that becomes the processes of a team, of one walk after the other.
+"""Processes that share what they import: forked from a program that has imported it once.
 
 An interpreter that starts and imports keeps a core busy for a second, and an agent that loads its
 machine code for almost as long. A team on one computer is half a dozen of them, which share its
-cores. So all that is done once, here, and whatever is forked has it.
+cores. This module is that program, and how it is asked. A process that starts one team after the
+other keeps its fork server between them.
 """
 
 from __future__ import annotations
 
+import atexit
+import ctypes
 import gc
 import importlib
 import json
 import os
 import runpy
+import select
 import signal
 import socket
+import subprocess
 import sys
-from collections.abc import Collection
-from dataclasses import asdict, dataclass
+import threading
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Final, NoReturn
+from typing import Final, NamedTuple, NoReturn
 
 from quadriga.shared.runtime.installed import PYTHON, code_digest, package_versions
 from quadriga.shared.runtime.signals import die_with_parent
@@ -33,88 +39,196 @@ _IMPORTED: Final = {
     "router": ("quadriga.team.router",),
     "sim": ("quadriga.plant.process", "quadriga.team.plants", "quadriga.sim_server.world.world"),
 }
-_AGENT: Final = "agent"
-_PROGRAM: Final = "quadriga"
-_ROOM: Final = 2_000  # bytes for the command line that a fork is shown with
-_ARG_START: Final = 48  # field of /proc/PID/stat, see proc(5)
-LARGEST: Final = 1 << 17  # bytes of an order, or of the answer to it
+_LARGEST: Final = 1 << 17  # bytes of an order, or of the answer to it
+_COMM: Final = Path("/proc/self/comm")  # the name of a process: its first 15 bytes count
+_PR_SET_CHILD_SUBREAPER: Final = 36  # linux/prctl.h
+_PR_GET_CHILD_SUBREAPER: Final = 37
+# What threadpoolctl sets where it is imported, and pytest for each test; nothing else reads them.
+_IGNORED: Final = {"KMP_DUPLICATE_LIB_OK", "PYTEST_CURRENT_TEST"}
+_one_at_a_time = threading.Lock()  # whether a process adopts is one word of it all
+_kept: list[ForkServer] = []  # one at most, and this process's own
+os.register_at_fork(after_in_child=_kept.clear)
 
 
-@dataclass(frozen=True, slots=True)
-class Fork:
-    """A process that is to be.
-
-    Attributes:
-        words: its command line, from the interpreter on.
-        log: the file that its output is added to.
-    """
+class Fork(NamedTuple):
+    """A process that is to be: the words behind `quadriga`, and the file for its output."""
 
     words: tuple[str, ...]
     log: str
 
 
-@dataclass(frozen=True, slots=True)
-class ForkOrder:
-    """What this program is to become.
+class ForkedProcess:
+    """A child of this process: what `subprocess.Popen` offers of one that it has started."""
 
-    With it comes a pipe that is open for reading: a fork takes a byte from it before it begins.
+    def __init__(self, pid: int) -> None:
+        self.pid = pid
+        self.returncode: int | None = None  # once it is known that it has ended
 
-    Attributes:
-        prefix: how many words of a command line come before the command's name.
-        forks: in the order in which they begin.
-    """
+    def poll(self) -> int | None:
+        """Its exit status, or minus the signal that ended it; None while it runs."""
+        if self.returncode is None:
+            pid, status = os.waitpid(self.pid, os.WNOHANG)
+            if pid:
+                self.returncode = os.waitstatus_to_exitcode(status)
+        return self.returncode
 
-    prefix: int
-    forks: tuple[Fork, ...]
+    def wait(self, timeout: float | None = None) -> int:
+        """Its exit status, once it has ended.
 
-    @property
-    def commands(self) -> list[str]:
-        """The commands of its forks."""
-        return list(dict.fromkeys(fork.words[self.prefix] for fork in self.forks))
+        Raises:
+            TimeoutExpired: it still runs after so many seconds.
+        """
+        if self.poll() is None:
+            ended = os.pidfd_open(self.pid)
+            try:
+                select.select([ended], [], [], timeout)
+            finally:
+                os.close(ended)
+        status = self.poll()
+        if status is None:
+            raise subprocess.TimeoutExpired(f"process {self.pid}", timeout or 0.0)
+        return status
 
-    def to_json(self) -> bytes:
-        return json.dumps(asdict(self)).encode()
+    def terminate(self) -> None:
+        """Send it SIGTERM, if it still runs."""
+        self._send(signal.SIGTERM)
 
-    @classmethod
-    def from_json(cls, text: bytes) -> ForkOrder:
-        raw = json.loads(text)
-        forks = (Fork(tuple(fork["words"]), fork["log"]) for fork in raw["forks"])
-        return cls(raw["prefix"], tuple(forks))
+    def kill(self) -> None:
+        """Send it SIGKILL, if it still runs."""
+        self._send(signal.SIGKILL)
+
+    def _send(self, number: int) -> None:
+        if self.poll() is None:  # else its number may be another's by now
+            os.kill(self.pid, number)
 
 
-def command_line(line: int, commands: Collection[str]) -> tuple[str, ...]:
-    """How this program is started.
+class ForkServer:
+    """A fork server that runs, and how it is asked.
 
     Args:
-        line: number of its end of a pair of sockets, over which orders come.
         commands: what will be ordered first, as far as that is known.
-
-    Returns:
-        Words of which the last one keeps room for a fork's command line.
+        environment: its own, and that of all that it starts.
     """
-    words = (str(line), str(os.getpid()), ",".join(commands))
-    return (*PYTHON, "-m", __name__, *words, " " * _ROOM)
+
+    def __init__(self, commands: Collection[str], environment: Mapping[str, str]) -> None:
+        self._made_for = _surroundings(environment)
+        self._line, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        with theirs:
+            self._process = subprocess.Popen(
+                (*PYTHON, "-m", __name__, str(os.getpid()), *commands),
+                stdin=theirs.fileno(),
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                env=environment,
+                start_new_session=True,
+            )
+
+    def fits(self, environment: Mapping[str, str]) -> bool:
+        """Whether it runs, and starts what this process would start with this environment."""
+        return self._made_for == _surroundings(environment) and self._process.poll() is None
+
+    def start(self, forks: Sequence[Fork], go: int) -> list[int]:
+        """Process ids of forks, which wait for a byte each from the pipe `go`.
+
+        There are none where the server has failed, or the system permits no more processes.
+        """
+        try:
+            socket.send_fds(self._line, [json.dumps(forks).encode()], [go])
+            return list(json.loads(self._line.recv(_LARGEST) or b"[]"))
+        except OSError:
+            return []
+
+    def close(self) -> None:
+        """End it. What it has started goes on; what has not begun yet, never does."""
+        self._line.close()
+        self._process.kill()
+        self._process.wait()
+
+
+def _surroundings(environment: Mapping[str, str]) -> tuple[str, str, Mapping[str, str]]:
+    """What a process that is started now gets: its folder, its network and its environment."""
+    variables = {name: environment[name] for name in environment.keys() - _IGNORED}
+    return os.getcwd(), os.readlink("/proc/thread-self/ns/net"), variables
+
+
+def expect_forks(commands: Collection[str], environment: Mapping[str, str]) -> None:
+    """Have what these commands need imported, beside whatever is done until they are started."""
+    with _one_at_a_time:
+        _fitting_server(commands, environment)
+
+
+def start_forked(forks: Sequence[Fork], environment: Mapping[str, str]) -> list[ForkedProcess]:
+    """Start processes that share what they import, each in a session of its own.
+
+    Children of this process, in the order of the forks; none if there can be none.
+    """
+    go, begin = os.pipe()
+    try:
+        with _one_at_a_time, _adopting():
+            server = _fitting_server({fork.words[0] for fork in forks}, environment)
+            pids = list[int]()
+            try:
+                pids = server.start(forks, go)
+            finally:
+                if not pids:  # it has failed, or its answer is not waited for
+                    end_fork_server()
+        os.write(begin, b"." * len(pids))
+    finally:
+        os.close(go)
+        os.close(begin)
+    return [ForkedProcess(pid) for pid in pids]
+
+
+def _fitting_server(commands: Collection[str], environment: Mapping[str, str]) -> ForkServer:
+    """The server that is kept, or a new one in its place if it does not fit."""
+    if _kept and not _kept[0].fits(environment):
+        end_fork_server()
+    if not _kept:
+        _kept.append(ForkServer(commands, environment))
+    return _kept[0]
+
+
+@atexit.register
+def end_fork_server() -> None:
+    """End the server that is kept, if there is one: no other team is to be started for now."""
+    while _kept:
+        _kept.pop().close()
+
+
+@contextmanager
+def _adopting() -> Iterator[None]:
+    """Within the block this process becomes the parent of what its children leave behind."""
+    libc, before = ctypes.CDLL(None, use_errno=True), ctypes.c_int()
+    libc.prctl(_PR_GET_CHILD_SUBREAPER, ctypes.byref(before), 0, 0, 0)
+    libc.prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+    try:
+        yield
+    finally:
+        libc.prctl(_PR_SET_CHILD_SUBREAPER, before.value, 0, 0, 0)
 
 
 def main() -> NoReturn:
     """Answer each order with the process ids, a list in JSON, until there is nobody to order."""
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
-    number, parent, commands = sys.argv[1:4]
-    die_with_parent(int(parent))
-    line, ready = socket.socket(fileno=int(number)), set[str]()
-    _prepare(commands.split(","), ready)
+    die_with_parent(int(sys.argv[1]))
+    line, ready = socket.socket(fileno=os.dup(0)), set[str]()
+    _prepare(sys.argv[2:], ready)
     while True:
-        text, handles, _, _ = socket.recv_fds(line, LARGEST, 1)
+        text, handles, _, _ = socket.recv_fds(line, _LARGEST, 1)
         if not text:
             os._exit(0)
-        order = ForkOrder.from_json(text)
-        _prepare(order.commands, ready)
-        pids, fork = _fork_apart(order)
-        if fork is not None:
+        forks = [Fork(tuple(words), log) for words, log in json.loads(text)]
+        _prepare({fork.words[0] for fork in forks}, ready)
+        read, write = os.pipe()
+        between = os.fork()  # it ends at once, so whoever has ordered its children adopts them
+        if between == 0:
             line.close()
-            _become(fork, order.prefix, handles[0])
+            _fork_all(forks, write, handles[0])
+        os.close(write)
         os.close(handles[0])
-        line.send(json.dumps(pids).encode())
+        with open(read, "rb") as said:  # until the last fork has closed it too
+            line.send(said.read() or b"[]")
+        os.waitpid(between, 0)
 
 
 def _prepare(commands: Collection[str], ready: set[str]) -> None:
@@ -123,105 +237,46 @@ def _prepare(commands: Collection[str], ready: set[str]) -> None:
         importlib.import_module("quadriga.commands.parser").build_parser()
         code_digest()  # of the files that are imported here: forks must not read later ones
         package_versions()
-    for command in commands:
-        if command in ready:
-            continue
+    for command in {*commands} - ready:
         ready.add(command)
         for module in _IMPORTED.get(command, ()):
             importlib.import_module(module)
-        if command == _AGENT:
+        if command == "agent":
             importlib.import_module("quadriga.warm_up").load_compiled()
     gc.freeze()  # or the first collection of each fork copies all pages
 
 
-def _fork_apart(order: ForkOrder) -> tuple[list[int], Fork | None]:
-    """Fork all from a process in between, which ends: so whoever orders them can adopt them.
-
-    Returns:
-        Their process ids, none if the system permits no more processes, and None; or in a fork
-        what it is to become.
-    """
-    read, write = os.pipe()
-    between = os.fork()
-    if between:
-        os.close(write)
-        with open(read, "rb") as said:  # until the last fork has closed it too
-            pids = json.loads(said.read() or b"[]")
-        os.waitpid(between, 0)
-        return pids, None
-    pids = []
-    fork = _fork_all(order, pids)
-    if fork is None:
-        os.write(write, json.dumps(pids).encode())
-        os._exit(0)
-    os.close(read)
-    os.close(write)
-    return [], fork
-
-
-def _fork_all(order: ForkOrder, pids: list[int]) -> Fork | None:
-    """What this process is to become if it is a fork; None for who forks them, who gets `pids`.
-
-    It ends if the system permits no more processes; there is none then.
-    """
-    for fork in order.forks:
+def _fork_all(forks: Sequence[Fork], say: int, go: int) -> NoReturn:
+    """Fork all and say their process ids; none runs if the system permits no more processes."""
+    pids = list[int]()
+    for fork in forks:
         try:
-            pid = os.fork()
+            pids.append(os.fork())
         except OSError:
             for started in pids:
                 os.kill(started, signal.SIGKILL)
-                os.waitpid(started, 0)
             os._exit(1)
-        if pid == 0:
-            return fork
-        pids.append(pid)
-    return None
+        if pids[-1] == 0:
+            os.close(say)
+            _become(fork, go)
+    os.write(say, json.dumps(pids).encode())
+    os._exit(0)
 
 
-def _become(fork: Fork, prefix: int, go: int) -> NoReturn:
+def _become(fork: Fork, go: int) -> NoReturn:
     """Be the fork's command once it may begin; end if nobody is left to say so."""
     os.setsid()
-    _redirect(fork.log)
+    log = os.open(fork.log, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o666)
+    for opened, file in ((os.open(os.devnull, os.O_RDONLY), 0), (log, 1), (log, 2)):
+        os.dup2(opened, file)
     if not os.read(go, 1):
         os._exit(0)
     os.close(go)
-    _show_words(fork.words)
-    sys.argv[1:] = fork.words[prefix:]
+    _COMM.write_text(f"quadriga {fork.words[0]}", encoding="ascii")  # as `top` shows it
+    sys.argv[1:] = fork.words
     importlib.invalidate_caches()  # there may be files that were not when they were filled
-    runpy.run_module(_PROGRAM, run_name="__main__", alter_sys=True)
+    runpy.run_module("quadriga", run_name="__main__", alter_sys=True)
     os._exit(0)  # it has ended the process
-
-
-def _redirect(log: str) -> None:
-    """Read nothing, and add what is written to the log."""
-    for opened, file in (
-        (os.open(os.devnull, os.O_RDONLY), 0),
-        (_append(log), 1),
-        (_append(log), 2),
-    ):
-        os.dup2(opened, file)
-        os.close(opened)
-
-
-def _append(log: str) -> int:
-    return os.open(log, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o666)
-
-
-def _show_words(words: tuple[str, ...]) -> None:
-    """Have `ps` show these words as this process's command line, in the place of the program's."""
-    try:
-        fields = Path("/proc/self/stat").read_text(encoding="ascii").rpartition(") ")[2].split()
-        start, end = (int(fields[_ARG_START - 3 + n]) for n in range(2))
-        shown = _joined(words)[: end - start]
-        with open("/proc/self/mem", "r+b", buffering=0) as memory:
-            memory.seek(start)
-            memory.write(shown.ljust(end - start, b"\0"))
-    except (OSError, ValueError, IndexError):
-        return  # a system that keeps its memory to itself; the process does its work
-
-
-def _joined(words: tuple[str, ...]) -> bytes:
-    return b"".join(word.encode() + b"\0" for word in words)
 
 
 if __name__ == "__main__":

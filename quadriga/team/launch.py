@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 import subprocess
 from collections import deque
 from collections.abc import Callable, Collection, Sequence
@@ -12,15 +11,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Self
 
-from quadriga.shared.bus.membership import processes
+from quadriga.shared.bus.diagnostics import processes
 from quadriga.shared.config.sections import BRIDGED, Config
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.members import LAST, LEADS, OPERATOR, RECORDER, ROUTER, SIM, Member, has_lead
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.runtime.installed import PYTHON
 from quadriga.shared.runtime.scheduling import valid_priority
-from quadriga.team.fork_server import Fork
-from quadriga.team.forked import ForkedProcess, expect_forks, start_forked
+from quadriga.team.fork_server import Fork, ForkedProcess, expect_forks, start_forked
 
 _ONE_THREAD: Final = (
     "OMP_NUM_THREADS",
@@ -31,9 +29,7 @@ _ONE_THREAD: Final = (
 QUADRIGA: Final = (*PYTHON, "-m", "quadriga")
 _SEVERAL: Final = 2  # processes, from which on it pays to import once for all
 _LAST_WORDS: Final = 12  # lines of a failed process's log that are shown
-_LEAST_DISK: Final = 4096  # bytes, of a file's first block
 _LOOK: Final = 0.02  # s
-_LARGEST_LOG: Final = 1 << 26  # bytes; of a longer one the first half is kept, and what comes then
 _LAST_CHANCE: Final = 2.0  # s for who has not left by itself in time, before SIGKILL
 _ROUTER_GRACE: Final = 5.0  # s
 _EARLY: Final = 4.0  # s, by which others may leave before who drives time: it closes politely
@@ -144,8 +140,8 @@ class Launch:
         """Start the project's own processes, if they are several, out of one, or none."""
         if len(rows) < _SEVERAL:
             return
-        forks = [Fork(_words(row), str(self._log_of(row))) for row in rows]
-        children = start_forked(forks, len(QUADRIGA), _environment())
+        forks = [Fork(_words(row)[len(QUADRIGA) :], str(self._log_of(row))) for row in rows]
+        children = start_forked(forks, _environment())
         self._running |= {row.name: child for row, child in zip(rows, children, strict=False)}
 
     def _start(self, row: ProcessSpec) -> None:
@@ -211,16 +207,9 @@ class Launch:
         """Names of those that have ended since this was asked last.
 
         Raises:
-            ProcessError: the folder of the logs is gone, or some failed. Of several the first
-                that a signal ended is named, since others may complain that it is gone, else the
-                first of the table.
+            ProcessError: some failed. Of several the first that a signal ended is named, since
+                others may complain that it is gone, else the first of the table.
         """
-        if not self._logs.is_dir():
-            raise ProcessError(
-                str(self._logs), "a folder that was deleted", "one that stays while the team walks"
-            )
-        for name in self._running:
-            bound_log(self._logs / f"{name}.log")
         polled = {name: process.poll() for name, process in self._running.items()}
         ended = {name: status for name, status in polled.items() if status is not None}
         for name in ended:
@@ -244,8 +233,7 @@ class Launch:
         ):
             lines = deque(log, maxlen=_LAST_WORDS)
         words = "".join(f"  {line}" for line in lines).rstrip()
-        none = "(none: the disk is full)" if _is_full(self._logs) else "(none)"
-        return words or f"  {none}"
+        return words or "  (none)"
 
     def stop(self) -> None:
         """Stop what still runs: SIGTERM, the recorder last, and SIGKILL after a grace period.
@@ -290,16 +278,3 @@ def _is_quadriga(row: ProcessSpec) -> bool:
 def _environment() -> dict[str, str]:
     # Their logs are read as UTF-8, whatever the terminal has.
     return {**os.environ, **dict.fromkeys(_ONE_THREAD, "1"), "PYTHONIOENCODING": "utf-8"}
-
-
-def bound_log(log: Path) -> None:
-    """Cut a log that a process floods, and say so in it; processes write at its end."""
-    if log.exists() and log.stat().st_size > _LARGEST_LOG:
-        os.truncate(log, _LARGEST_LOG // 2)
-        with log.open("ab") as file:
-            file.write(b"\n(more was written here than a log may hold, and cut)\n")
-
-
-def _is_full(folder: Path) -> bool:
-    """Whether nothing more can be written there, so that a process cannot say what is wrong."""
-    return folder.is_dir() and shutil.disk_usage(folder).free < _LEAST_DISK

@@ -12,7 +12,7 @@ from quadriga.drive.client import socket_path
 from quadriga.drive.controls import DriveControls
 from quadriga.drive.server import DriveServer
 from quadriga.shared import members
-from quadriga.shared.bus.discovery import REJOINS, join
+from quadriga.shared.bus.discovery import join
 from quadriga.shared.bus.liveness import Liveness
 from quadriga.shared.bus.session import POLL, READY, Bus
 from quadriga.shared.codec import decode, encode
@@ -62,8 +62,6 @@ def references_of(config: Config) -> Callable[[int], Reference | None]:
 def run(config: Config, stopped: Callable[[], bool] | None = None, view: str = "") -> None:
     """Publish the reference, following the team's clock, until the walk ends or it is stopped.
 
-    An operator that is started while its team walks goes on where the team's time is.
-
     Args:
         config: the team's configuration.
         stopped: asked often whether to stop; by default a flag that SIGINT and SIGTERM raise.
@@ -85,11 +83,10 @@ def run(config: Config, stopped: Callable[[], bool] | None = None, view: str = "
                 # The token drives the team, and this may be a log that others read.
                 page = server.url.partition("?")[0]
                 print(f"page to drive from: {page}; `quadriga drive` tells its token", flush=True)
-            joined = join(bus, config, stopped, rejoins=True)
-            if not joined:
+            if not join(bus, config, stopped):
                 return
             with at_work(config.runtime.priority):  # without a reference the robots stop
-                _Operator(config, bus, controls).operate(stopped, late=joined == REJOINS)
+                _Operator(config, bus, controls).operate(stopped)
 
 
 def _socket_path(team: str) -> Path | None:
@@ -117,15 +114,9 @@ class _Operator:
             self._at, self._look = self._driven.at, LOOK
             self._ahead = _DRIVEN_AHEAD if realtime else _AHEAD
 
-    def operate(self, stopped: Callable[[], bool], *, late: bool) -> None:
-        """Publish the reference of each epoch that the team's time comes near to.
-
-        Who is `late` first waits for the time, and begins with the epoch that is in force.
-        """
-        time = self._time
-        while late and not (stopped() or time.over or time.known):
-            self._follow()
-        epoch = time.tick // EPOCH_MS
+    def operate(self, stopped: Callable[[], bool]) -> None:
+        """Publish the reference of each epoch that the team's time comes near to."""
+        time, epoch = self._time, 0
         while not stopped():
             if EPOCH_MS * epoch <= time.tick + EPOCH_MS * self._ahead:
                 self._put(encode(self._at(EPOCH_MS * epoch)))
@@ -164,11 +155,6 @@ class TeamTicks:
         self._newest = -1  # tick of the clock
         self._end = 0  # tick that was announced
         self.over = False
-
-    @property
-    def known(self) -> bool:
-        """Whether the time has been heard."""
-        return self._newest >= 0
 
     @property
     def tick(self) -> int:

@@ -11,7 +11,7 @@ from rich.console import Console
 from quadriga.plant.deadlines import MODE as REALTIME
 from quadriga.progress import build_progress
 from quadriga.recordings.late_commands import late_shares, overloaded
-from quadriga.shared.bus.membership import members
+from quadriga.shared.bus.diagnostics import members
 from quadriga.shared.bus.session import HERE, READY, Bus
 from quadriga.shared.codec import decode
 from quadriga.shared.codes import DOWN

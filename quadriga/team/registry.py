@@ -2,21 +2,47 @@
 
 from __future__ import annotations
 
+import json
 import os
-import stat
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Final
 
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
-from quadriga.shared.runtime.places import is_private, make_runtime_dir, runtime_dir
+from quadriga.shared.errors import ConfigError
+from quadriga.shared.runtime.atomic import write_text
+from quadriga.shared.runtime.places import make_runtime_dir, runtime_dir
 from quadriga.shared.runtime.process_use import read_use
-from quadriga.team.running_team import RunningTeam, read_running_team, to_json, unite_teams
 
 _SUFFIX: Final = ".json"
-_LONGEST: Final = 65_536  # bytes that are read of a file
+_SHOWN: Final = 6  # of many teams, in an error
+_LONGEST: Final = 200  # characters of one's name or file there
+
+
+@dataclass(frozen=True, slots=True)
+class RunningTeam:
+    """What a process of a team leaves for others of this machine to find.
+
+    Attributes:
+        team: its name.
+        endpoint: where its bus is.
+        config: path of the configuration in force, a TOML file.
+        folder: its run folder; "" if there is none.
+        directory: that its processes were started in; paths in the configuration begin there.
+        pid: of the process that says so.
+        started: when that process was started, see `ProcessUse`.
+    """
+
+    team: str
+    endpoint: str
+    config: str
+    folder: str
+    directory: str
+    pid: int
+    started: int
 
 
 @contextmanager
@@ -29,11 +55,19 @@ def team_registered(config: Config, run_dir: Path | None = None) -> Iterator[Non
         config: the configuration in force.
         run_dir: holds it as `config.toml`; None: a copy is left beside the file.
     """
-    pid = os.getpid()
+    pid, use = os.getpid(), read_use(os.getpid())
     entry = runtime_dir() / f"{pid}{_SUFFIX}"
     copy = entry.with_suffix(".toml")
     try:
-        _leave(entry, copy, config, run_dir, pid)
+        if use is not None and make_runtime_dir() is not None:
+            with suppress(OSError):
+                folder = "" if run_dir is None else str(run_dir.resolve())
+                if run_dir is None:
+                    write_text(copy, to_toml(config))
+                file = f"{folder}/config.toml" if folder else str(copy)
+                place = config.team.name, config.bus.endpoint, file, folder, os.getcwd()
+                team = asdict(RunningTeam(*place, pid, use.started))
+                write_text(entry, json.dumps(team, ensure_ascii=False))
         yield
     finally:
         for path in (entry, copy):
@@ -41,60 +75,50 @@ def team_registered(config: Config, run_dir: Path | None = None) -> Iterator[Non
                 path.unlink(missing_ok=True)
 
 
-def _leave(entry: Path, copy: Path, config: Config, run_dir: Path | None, pid: int) -> None:
-    use = read_use(pid)
-    if use is None or make_runtime_dir() is None:
-        return
-    with suppress(OSError):
-        folder = "" if run_dir is None else str(run_dir.resolve())
-        if run_dir is None:
-            _write(copy, to_toml(config))
-        file = str(copy if run_dir is None else run_dir.resolve() / "config.toml")
-        bus, name = config.bus, config.team.name
-        team = RunningTeam(name, bus.endpoint, file, folder, os.getcwd(), pid, use.started)
-        _write(entry, to_json(team))
-
-
 def running_teams() -> tuple[RunningTeam, ...]:
     """The teams of this user that run on this machine now, the oldest first.
 
-    Files of processes that have ended are removed; those of other users are not looked at.
+    Files of processes that have ended are removed. Those of other users are not looked at: the
+    folder is this user's alone, or none.
     """
     folder = make_runtime_dir()
-    if folder is None:
-        return ()
     found = []
-    for file in sorted(folder.glob(f"*{_SUFFIX}")):
-        team = _read(file)
-        if team is None:
-            continue
-        use = read_use(team.pid)
-        if use is not None and use.started == team.started:
-            found.append(team)
-        else:
+    for file in () if folder is None else sorted(folder.glob(f"*{_SUFFIX}")):
+        with suppress(OSError, ValueError, TypeError):  # it is gone, or none of this version
+            team = RunningTeam(**json.loads(file.read_text(encoding="utf-8")))
+            use = read_use(team.pid)
+            if use is not None and use.started == team.started:
+                found.append(team)
+                continue
             for path in (file, file.with_suffix(".toml")):
-                with suppress(OSError):
-                    path.unlink(missing_ok=True)
+                path.unlink(missing_ok=True)
     return unite_teams(found)
 
 
-def _read(file: Path) -> RunningTeam | None:
-    """What a file of this user tells; None if it is somebody else's, or tells nothing."""
-    try:
-        with open(os.open(file, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK), "rb") as opened:
-            about = os.fstat(opened.fileno())
-            if not stat.S_ISREG(about.st_mode) or not is_private(about):
-                return None
-            return read_running_team(opened.read(_LONGEST).decode("utf-8", errors="replace"))
-    except OSError:
-        return None
+def unite_teams(found: Iterable[RunningTeam]) -> tuple[RunningTeam, ...]:
+    """Each team once: what several of its processes say, with a run folder if one has it."""
+    united: dict[tuple[str, str], RunningTeam] = {}
+    for team in sorted(found, key=lambda team: (not team.folder, team.started)):
+        united.setdefault((team.team, team.endpoint), team)
+    return tuple(sorted(united.values(), key=lambda team: (team.started, team.pid)))
 
 
-def _write(path: Path, text: str) -> None:
-    """Write a file that is there whole or not at all, for this user alone."""
-    partial = path.with_name(f".{path.name}.partial")
-    partial.unlink(missing_ok=True)
-    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW
-    with open(os.open(partial, flags, 0o600), "w", encoding="utf-8") as file:
-        file.write(text)
-    partial.replace(path)
+def choose_team(teams: Sequence[RunningTeam], wanted: str = "") -> RunningTeam | None:
+    """The team that a user means; None if none of these is.
+
+    Args:
+        teams: those that run on this machine.
+        wanted: name of the one meant; "": the only one.
+
+    Raises:
+        ConfigError: several are meant.
+    """
+    meant = [team for team in teams if not wanted or team.team == wanted]
+    if len(meant) < 2:
+        return meant[0] if meant else None
+    by_name = len({team.team for team in meant}) == len(meant)
+    choices = [f"--team {t.team}" if by_name else f"--config {t.config}" for t in meant[:_SHOWN]]
+    choices = [choice[:_LONGEST] for choice in choices]
+    more = [f"and {len(meant) - _SHOWN} more"] if len(meant) > _SHOWN else []
+    got = f"{len(meant)} that run on this machine"
+    raise ConfigError("team", got, "the choice of one", "; ".join([*choices, *more]))

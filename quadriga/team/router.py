@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import Final
 
-from quadriga.shared.bus.membership import lead
+from quadriga.shared.bus.diagnostics import lead
 from quadriga.shared.bus.session import POLL, READY, Bus
 from quadriga.shared.bus.settings import link_settings
 from quadriga.shared.config.endpoints import is_tls

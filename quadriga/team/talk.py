@@ -6,7 +6,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Final, Self
 
-from quadriga.shared.bus.membership import processes
+from quadriga.shared.bus.diagnostics import processes
 from quadriga.shared.bus.session import HERE, POLL, Bus
 from quadriga.shared.codec import decode, encode, envelope
 from quadriga.shared.config.sections import Config

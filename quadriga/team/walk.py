@@ -23,7 +23,7 @@ from quadriga.sim_server.world.scenario import build_loads, build_scenario
 from quadriga.team.controller_program import check_controller
 from quadriga.team.drive_page import DrivePage
 from quadriga.team.endpoint import endpoint_claimed
-from quadriga.team.forked import end_fork_server
+from quadriga.team.fork_server import end_fork_server
 from quadriga.team.launch import Launch, ProcessSpec, expect_launch, process_table
 from quadriga.team.plants import check_plant
 from quadriga.team.progress import WalkProgress

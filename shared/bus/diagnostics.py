@@ -8,8 +8,11 @@ from typing import Final, NamedTuple
 
 from quadriga.shared.about import HERE, READY, STAGES, STARTED, WARMING_UP, About
 from quadriga.shared.about import REFUSED as NOT_GRANTED
+from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError
-from quadriga.shared.members import SIM, Member
+from quadriga.shared.members import LEADS, PLANNER, SIM, Member, team_members
+from quadriga.shared.planner_kinds import find_kind
+from quadriga.shared.robots.conventions import robot_names
 
 GOOD: Final = "good"
 NOTE: Final = "note"  # worth knowing, and nothing is wrong
@@ -23,17 +26,16 @@ FOREIGN: Final = "foreign"
 NOT_REACHABLE: Final = "not-reachable"
 UNREADABLE: Final = "unreadable"
 TWO_OF_A_NAME: Final = "two-of-a-name"
+NOT_SEEN: Final = "not-seen"
 DIFFERS: Final = "other-"  # and what: `other-configuration`
 CLOCK_OFF: Final = "clock-off"
-NOT_SEEN: Final = "not-seen"
 NOT_REALTIME: Final = "not-realtime"
 
+RECEIVE_BUFFER: Final = 4 << 20  # bytes, of each link's socket
 CLOCK_LIMIT: Final = 0.1  # s, by which system clocks may differ: recordings are read by them
 PACE_LIMIT: Final = 1e-3  # s, by which those of plants may that pace their robots by them
 CLOCK_REMEDY: Final = "keep the clocks of all computers by PTP (ptp4l, phc2sys) or chrony"
-_PACED: Final = frozenset(
-    {"team.plant_per_robot=true", 'world.mode="realtime"'}
-)  # of the configuration
+_PACED: Final = {"team.plant_per_robot=true", 'world.mode="realtime"'}  # of the configuration
 # In what processes may differ, in the order in which it is told, and what to do about it.
 REMEDIES: Final[Mapping[str, str]] = {
     "version": "install the same version of quadriga on all computers",
@@ -53,6 +55,35 @@ _STAGES: Final = {
     WARMING_UP: (NOTE, "still warming up"),
     READY: (GOOD, "ready"),
 }
+
+
+def processes(config: Config) -> tuple[Member, ...]:
+    """All processes of a team, in the order of the table of processes."""
+    return team_members(
+        robot_names(config.team.robots),
+        central=find_kind(config.planner.kind).central,
+        recorded=config.recorder.enabled,
+        plant_each=config.team.plant_per_robot,
+        foreign=bool(config.team.agent_command),
+    )
+
+
+def members(config: Config) -> frozenset[str]:
+    """Names of all processes of a team."""
+    return frozenset(member.name for member in processes(config))
+
+
+def lead(config: Config) -> str:
+    """Name of the process that drives the team's time, with which all others leave."""
+    return next(member.name for member in processes(config) if member.name in LEADS)
+
+
+def first_predicting(config: Config) -> str:
+    """Name of the first process that plans with a predictor; "" if none does."""
+    kind = find_kind(config.planner.kind)
+    if not kind.needs_predictor:
+        return ""
+    return PLANNER if kind.central else robot_names(config.team.robots)[0]
 
 
 class ClockOffset(NamedTuple):
@@ -91,31 +122,16 @@ class Diagnosis:
     remedy: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class TeamNorm:
-    """What all must agree with.
-
-    Attributes:
-        lead: what the process that drives the team's time says of itself.
-        predictor: digest of the predictor of the first process that plans; "": unknown.
-        planner: the name of that process.
-    """
+class TeamNorm(NamedTuple):
+    """What all must agree with: who drives the team's time, and the first process that plans."""
 
     lead: About
-    predictor: str = ""
+    predictor: str = ""  # its digest; "": unknown
     planner: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Disagreement:
-    """In what one process differs.
-
-    Attributes:
-        of: a key of `REMEDIES`; no team walks with those of `DECISIVE`.
-        got: what it has.
-        wanted: what it should have.
-        owner: the process that has this.
-    """
+class Disagreement(NamedTuple):
+    """In what one process differs: a key of `REMEDIES`, what it has, and what the owner has."""
 
     of: str
     got: str
@@ -166,20 +182,27 @@ class TeamView:
     answers: Mapping[str, Sequence[MemberAnswer]] = field(default_factory=dict)
     norm: TeamNorm | None = None
 
+    def abouts(self, name: str) -> list[About]:
+        """What the processes of a name have said of themselves, as far as it can be read."""
+        return [said.about for said in self.answers.get(name, ()) if said.about is not None]
+
     def about(self, name: str) -> About | None:
         """What a process has said of itself; of several of one name the one that is further."""
-        said = [answer.about for answer in self.answers.get(name, ()) if answer.about is not None]
-        return max(said, key=lambda about: STAGES.index(about.stage), default=None)
+        return max(self.abouts(name), key=lambda said: STAGES.index(said.stage), default=None)
 
 
 def diagnose(member: Member, view: TeamView) -> tuple[Diagnosis, ...]:
     """All there is to say of a member: why it is not there, or how far it is and what is wrong."""
     about = view.about(member.name)
-    doubled = tuple(_two_of_a_name(member.name, view))
-    if about is not None:
-        stage, differs = _explain_stage(about, view), _find_differences(about, view)
-        return (*doubled, *stage, *differs, *_compare_clocks(member, view))
-    return (*doubled, _explain_silence(member, view))
+    found = [*_two_of_a_name(member.name, view)]
+    if about is None:
+        return (*found, _explain_silence(member, view))
+    found += _explain_stage(about, view)
+    for item in disagreements(about, view.norm) if view.norm else ():
+        verdict = BAD if item.of in DECISIVE else NOTE
+        text = f"another {item.of}: {item.got}, {item.owner} has {item.wanted}"
+        found.append(Diagnosis(f"{DIFFERS}{item.of}", verdict, text, REMEDIES[item.of]))
+    return (*found, *_compare_clocks(member, view))
 
 
 def describe_absent(absent: Collection[Member], view: TeamView) -> str:
@@ -219,12 +242,7 @@ def disagreements(process: About, norm: TeamNorm) -> tuple[Disagreement, ...]:
 
 
 def refuse(name: str, team: str, found: Iterable[Disagreement]) -> None:
-    """Refuse a process that differs in what no team walks with.
-
-    Args:
-        name: the process.
-        team: the team's name.
-        found: in what it differs.
+    """Refuse process `name` of a team if it differs in what no team walks with.
 
     Raises:
         BusError: it does; the message names what, for instance the keys of the configuration.
@@ -252,14 +270,17 @@ def _explain_silence(member: Member, view: TeamView) -> Diagnosis:
     name = member.name
     if view.answers.get(name):
         text = "says what this version cannot read"
-        return Diagnosis(UNREADABLE, BAD, text, "another version of quadriga: install the same one")
+        cause = "another version of quadriga: install the same one"
+        return Diagnosis(UNREADABLE, BAD, text, cause)
     if name in view.here:
         if member.foreign:
-            return Diagnosis(FOREIGN, NOTE, "here, a controller of one's own that answers nothing")
+            text = "here, a controller of one's own that answers nothing"
+            return Diagnosis(FOREIGN, NOTE, text)
         cause = "frozen or overloaded, or an earlier version of quadriga: see its log, restart it"
         return Diagnosis(NOT_ANSWERING, BAD, "here, but does not answer", cause)
-    abouts = ((other, view.about(other)) for other in view.answers)
-    witnesses = sorted(other for other, about in abouts if about and name in about.sees)
+    witnesses = sorted(
+        other for other in view.answers if (said := view.about(other)) and name in said.sees
+    )
     if witnesses:
         text = f"seen by {', '.join(witnesses)}, but not from here"
         cause = "frozen, or in peer mode its bus.listen cannot be reached from here"
@@ -274,13 +295,12 @@ def _explain_silence(member: Member, view: TeamView) -> Diagnosis:
 
 
 def _two_of_a_name(name: str, view: TeamView) -> Iterator[Diagnosis]:
-    said = [answer.about for answer in view.answers.get(name, ()) if answer.about is not None]
-    announced = [about for about in said if about.stage != STARTED]  # a late recorder is none
-    if name not in view.doubled and len(announced) < 2:
-        return
-    where = " and ".join(f"{about.host}:{about.pid}" for about in announced)
-    text = f"two processes of this name{f', {where}' if len(announced) > 1 else ''}"
-    yield Diagnosis(TWO_OF_A_NAME, BAD, text, "stop one of them, or give one team another name")
+    # A late recorder, which has not announced itself, is none.
+    announced = [about for about in view.abouts(name) if about.stage != STARTED]
+    if name in view.doubled or len(announced) > 1:
+        where = " and ".join(f"{about.host}:{about.pid}" for about in announced)
+        text = f"two processes of this name{f', {where}' if len(announced) > 1 else ''}"
+        yield Diagnosis(TWO_OF_A_NAME, BAD, text, "stop one, or give one team another name")
 
 
 def _explain_stage(about: About, view: TeamView) -> Iterator[Diagnosis]:
@@ -296,13 +316,6 @@ def _explain_stage(about: About, view: TeamView) -> Iterator[Diagnosis]:
     if about.scheduling == NOT_GRANTED:
         cause = "permit it: LimitRTPRIO=1 in its unit, or rtprio 1 in /etc/security/limits.d"
         yield Diagnosis(NOT_REALTIME, BAD, "has no real-time scheduling", cause)
-
-
-def _find_differences(about: About, view: TeamView) -> Iterator[Diagnosis]:
-    for item in disagreements(about, view.norm) if view.norm else ():
-        verdict = BAD if item.of in DECISIVE else NOTE
-        text = f"another {item.of}: {item.got}, {item.owner} has {item.wanted}"
-        yield Diagnosis(f"{DIFFERS}{item.of}", verdict, text, REMEDIES[item.of])
 
 
 def _compare_clocks(member: Member, view: TeamView) -> Iterator[Diagnosis]:

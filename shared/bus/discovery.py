@@ -1,42 +1,53 @@
 """The start-up barrier: nobody walks before everybody is there, linked, warmed up and agrees.
 
 All processes ask each other who they are. Who differs in version, configuration or predictor leaves
-by itself, and who drives the team's time starts no team in which one differs or does not answer. A
-process that is started again joins its team as it walks.
+by itself, and who drives the team's time starts no team in which one differs or does not answer.
+Nobody joins a team that walks.
 """
 
 from __future__ import annotations
 
+import os
+import socket
 import sys
 from collections.abc import Callable, Collection
+from dataclasses import replace
 from typing import Final
 
-from quadriga.shared.about import ABOUT, STAGES, About
+from quadriga.shared.about import ABOUT, STAGES, STARTED, About, scheduling_of, stage_of
 from quadriga.shared.bus.diagnostics import (
     MemberAnswer,
     TeamNorm,
     TeamView,
     describe_absent,
     disagreements,
+    first_predicting,
+    lead,
+    members,
+    processes,
     refuse,
 )
-from quadriga.shared.bus.endpoint import describe_way
-from quadriga.shared.bus.membership import first_predicting, lead, members, processes
-from quadriga.shared.bus.process_info import ProcessInfo, describe_process
 from quadriga.shared.bus.session import HERE, READY, Bus, pause
-from quadriga.shared.codec import decode
+from quadriga.shared.bus.settings import describe_way
+from quadriga.shared.codec import decode, encode
 from quadriga.shared.config.sections import Config
+from quadriga.shared.config.write import agreed_keys
 from quadriga.shared.errors import BusError, MessageError
-from quadriga.shared.members import LEADS, OPERATOR, RECORDER, SIM, has_lead
-from quadriga.shared.runtime.clock import monotonic, sleep
+from quadriga.shared.members import LEADS, RECORDER, SIM, has_lead
+from quadriga.shared.runtime.clock import monotonic, wall_ns
+from quadriga.shared.runtime.installed import (
+    PROJECT,
+    code_digest,
+    package_versions,
+    project_version,
+)
+from quadriga.shared.runtime.scheduling import REALTIME, has_priority
+from quadriga.shared.schema import message_forms
 
 Pause = Callable[[], None]
 Answered = dict[str, list[MemberAnswer]]
 
-STARTS: Final = "starts"  # with its team
-REJOINS: Final = "rejoins"  # a team that walks
 ALL: Final = ("*",)  # ask everybody
-_SETTLE: Final = 0.2  # s, in which all who are there become known, maybe one of the same name
 _TIMEOUT: Final = 1.0  # s, for an answer: whoever is not frozen gives it within milliseconds
 _GRACE: Final = 0.5  # s more, after which nothing is awaited whatever the bus says
 _PATIENCE: Final = 3.0  # s, in which those that do not answer are asked again
@@ -51,6 +62,65 @@ def log(text: str) -> None:
     print(f"quadriga: {text}", file=sys.stderr, flush=True)
 
 
+class ProcessInfo:
+    """What this process answers from now on to whoever asks who it is, as it is at that moment.
+
+    Args:
+        bus: this process's.
+        config: the configuration that it has.
+        predictor_sha256: digest of the predictor that it has; "": none.
+
+    Attributes:
+        met: whether this process has seen that all are here.
+        start_ns: when tick 0 begins by the system clock, of the plant that drives time for others.
+    """
+
+    def __init__(self, bus: Bus, config: Config, predictor_sha256: str = "") -> None:
+        self._bus = bus
+        # A recorder never asks for it; in lock-step nobody needs it.
+        paced = config.world.mode == "realtime" and bus.name != RECORDER
+        self._wanted = paced and config.runtime.priority == REALTIME
+        self._fixed = describe_process(config, bus.name, predictor_sha256)
+        self.met, self.start_ns = False, 0
+        bus.answer(ABOUT.key(bus.team, bus.name), lambda: encode(self.about))
+
+    @property
+    def about(self) -> About:
+        """What this process says of itself now."""
+        stage = stage_of(self._bus.reached, met=self.met)
+        return replace(
+            self._fixed,
+            stage=stage,
+            scheduling=scheduling_of(wanted=self._wanted, granted=has_priority(), stage=stage),
+            sees=tuple(sorted(self._bus.members_at(HERE))),
+            wall_ns=wall_ns(),
+            start_ns=self.start_ns,
+        )
+
+
+def describe_process(config: Config, name: str, predictor_sha256: str = "") -> About:
+    """What does not change of what a process says of itself."""
+    versions, no_library = package_versions(), ("machine", PROJECT)
+    return About(
+        tick=0,
+        stamp_ns=0,
+        name=name,
+        host=socket.gethostname(),
+        pid=os.getpid(),
+        version=project_version(),
+        code=code_digest(),
+        libraries=tuple(f"{k} {v}" for k, v in versions.items() if k not in no_library),
+        config=agreed_keys(config),
+        messages=message_forms(),
+        predictor=predictor_sha256,
+        stage=STARTED,
+        scheduling=scheduling_of(wanted=False, granted=False, stage=STARTED),
+        sees=(),
+        wall_ns=0,
+        start_ns=0,
+    )
+
+
 def ask(bus: Bus, names: Collection[str] = ALL, wait: Pause = pause) -> Answered:
     """What processes say of themselves, by name, once all have answered or a second has passed.
 
@@ -60,7 +130,9 @@ def ask(bus: Bus, names: Collection[str] = ALL, wait: Pause = pause) -> Answered
         wait: called all the time meanwhile; takes some milliseconds.
     """
     questions = [bus.ask(ABOUT.key(bus.team, name), _TIMEOUT) for name in names]
-    _wait_for(_TIMEOUT + _GRACE, wait, lambda: all(question.over for question in questions))
+    deadline = monotonic() + _TIMEOUT + _GRACE
+    while not all(question.over for question in questions) and monotonic() < deadline:
+        wait()
     answered: Answered = {}
     for question in questions:
         for arrived_ns, key, payload in question.take():
@@ -71,7 +143,7 @@ def ask(bus: Bus, names: Collection[str] = ALL, wait: Pause = pause) -> Answered
 
 
 def ask_clock(bus: Bus, name: str, wait: Pause = pause) -> MemberAnswer | None:
-    """Of some answers that with the shortest round trip; None if it does not answer.
+    """Of some answers of a process that with the shortest round trip; None if it gives none.
 
     Args:
         bus: where it is.
@@ -110,25 +182,17 @@ def view_of(
         fallback: with what all are compared where the process that drives time says nothing.
     """
     linked = bus.linked or bus.name in LEADS  # to whom all others link
-    here, doubled, names = bus.members_at(HERE), bus.duplicates(HERE), members(config)
-    view = TeamView(linked, here, doubled, names, answered)
-    leader = view.about(lead(config)) or fallback
+    view = TeamView(linked, bus.members_at(HERE), bus.duplicates(HERE), members(config), answered)
+    leader, planner = view.about(lead(config)) or fallback, first_predicting(config)
     if leader is None:
         return view
-    planner = first_predicting(config)
     plans = view.about(planner)
-    norm = TeamNorm(leader, plans.predictor if plans else "", planner)
-    return TeamView(linked, here, doubled, names, answered, norm)
+    return replace(view, norm=TeamNorm(leader, plans.predictor if plans else "", planner))
 
 
 def join(
-    bus: Bus,
-    config: Config,
-    stopped: Callable[[], bool],
-    info: ProcessInfo | None = None,
-    *,
-    rejoins: bool = False,
-) -> str:
+    bus: Bus, config: Config, stopped: Callable[[], bool], info: ProcessInfo | None = None
+) -> bool:
     """Announce this process, whose subscribers are declared, and wait until all others are here.
 
     A token is seen over the link its process uses for everything else, behind its subscriptions:
@@ -139,12 +203,9 @@ def join(
         config: the team's configuration.
         stopped: asked often whether to stop.
         info: what this process says of itself; by default that it has no predictor.
-        rejoins: whether it may take part in a team that walks already. In lock-step only an
-            operator or a recorder may: what an agent does depends on all that it has heard since
-            the begin of the walk.
 
     Returns:
-        `STARTS`, or `REJOINS` in a team that walks; "" if `stopped()` came first.
+        False if `stopped()` came first.
 
     Raises:
         BusError: some did not come in time, the team walks already, has such a member already, or
@@ -159,20 +220,17 @@ def join(
     log(f"{bus.name} of team {bus.team!r} is at {config.bus.endpoint}, waits until all are there")
     here = await_members(bus, config, HERE, members(config), lambda: stopped() or walks())
     if stopped():
-        return ""
+        return False
     if here:
         log(f"{bus.name}: all {len(members(config))} processes are there")
         pause()  # who is ready has said so right behind that it is here
-    joined = REJOINS if walks() else STARTS
-    if joined == REJOINS:
-        sleep(_SETTLE)
-        _check_rejoin(bus, config, permitted=rejoins)
+    if walks():
+        team, cause = f"team {bus.team!r} at {config.bus.endpoint}", "start the whole team again"
+        raise BusError(team, "a team that walks already", "a network without this team", cause)
     _check_single(bus, config)
     _check_oneself(bus, config, info.about)
     info.met = True
-    if joined == REJOINS:
-        log(f"{bus.name} joins team {bus.team!r}, which walks")
-    return joined
+    return True
 
 
 def await_members(
@@ -193,26 +251,26 @@ def await_members(
     """
     due, logged = monotonic() + _QUIET, ""
 
+    def describe(absent: Collection[str]) -> tuple[str, bool]:
+        """Why some are not there, and whether this process is linked to anybody."""
+        view = view_of(bus, config, ask(bus, wait=wait), describe_process(config, bus.name))
+        awaited = [member for member in processes(config) if member.name in absent]
+        return describe_absent(awaited, view), view.linked
+
     def wait_and_log() -> None:
         nonlocal due, logged
         wait()
         if monotonic() < due:
             return
         absent = frozenset(names) - {bus.name} - bus.members_at(stage)
-        reasons = _describe(absent)[0] if absent else logged
+        reasons = describe(absent)[0] if absent else logged
         if reasons != logged:
             log(f"{bus.name} waits; {reasons}")
         due, logged = monotonic() + _EVERY, reasons
 
-    def _describe(absent: Collection[str]) -> tuple[str, bool]:
-        """Why some are not there, and whether this process is linked to anybody."""
-        view = view_of(bus, config, ask(bus, wait=wait), describe_process(config, bus.name))
-        waited = [member for member in processes(config) if member.name in absent]
-        return describe_absent(waited, view), view.linked
-
     def explain(absent: Collection[str]) -> str:
         """The same in one line; takes a second if one of those there is frozen."""
-        reasons, linked = _describe(absent)
+        reasons, linked = describe(absent)
         # Only now, at the end: to try it may take a second in which a robot would not be attended.
         return reasons if linked else f"{reasons}; {describe_way(config.bus, bus.name)}"
 
@@ -276,7 +334,9 @@ def check_others(bus: Bus, config: Config, names: Collection[str], wait: Pause =
     foreign = {member.name for member in processes(config) if member.foreign}
     deadline = monotonic() + _PATIENCE
     while (silent := {*others} - {*answered} - foreign) and monotonic() < deadline:
-        _wait_for(_BETWEEN, wait)
+        again = monotonic() + _BETWEEN
+        while monotonic() < again:
+            wait()
         answered |= ask(bus, sorted(silent), wait)
     view = view_of(bus, config, answered, describe_process(config, bus.name))
     for name in others:
@@ -291,16 +351,6 @@ def check_others(bus: Bus, config: Config, names: Collection[str], wait: Pause =
                 "it is frozen or overloaded, or has another version of quadriga",
             )
         refuse(name, bus.team, disagreements(about, view.norm))
-
-
-def _check_rejoin(bus: Bus, config: Config, *, permitted: bool) -> None:
-    cause = "another team.name or bus.endpoint is needed"
-    if permitted and config.world.mode == "lockstep":
-        permitted = bus.name in (OPERATOR, RECORDER)
-        cause = "in lock-step no agent can be started again: start the whole team"
-    if not permitted:
-        team = f"team {bus.team!r} at {config.bus.endpoint}"
-        raise BusError(team, "a team that walks already", "a network without this team", cause)
 
 
 def _check_single(bus: Bus, config: Config) -> None:
@@ -318,20 +368,11 @@ def _check_oneself(bus: Bus, config: Config, about: About) -> None:
 
     Whoever differs leaves by itself, so that the others can go on waiting for the right one.
     """
-    leader = lead(config)
-    others = {leader, first_predicting(config)} - {bus.name, ""}
+    others = {lead(config), first_predicting(config)} - {bus.name, ""}
     norm = view_of(bus, config, ask(bus, sorted(others))).norm
-    if norm is None:
-        if bus.name != leader:
-            log(f"{leader} does not say what it is: frozen, or an earlier version of quadriga?")
+    if norm is None:  # the process that drives time refuses later who does not answer
         return
     found = disagreements(about, norm)
     refuse(bus.name, bus.team, found)
     if any(item.of == "code" for item in found):
-        log(f"{leader} has the same version of quadriga, but other source files")
-
-
-def _wait_for(seconds: float, wait: Pause, over: Callable[[], bool] = lambda: False) -> None:
-    deadline = monotonic() + seconds
-    while not over() and monotonic() < deadline:
-        wait()
+        log(f"{norm.lead.name} has the same version of quadriga, but other source files")

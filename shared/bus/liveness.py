@@ -7,12 +7,11 @@ from collections.abc import Callable
 from datetime import UTC, datetime
 from typing import Final, NamedTuple
 
+from quadriga.shared.bus.diagnostics import lead
 from quadriga.shared.bus.discovery import log
-from quadriga.shared.bus.membership import lead
 from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.codes import LEAD_GONE, LINK_LOST
 from quadriga.shared.config.sections import Config
-from quadriga.shared.config.timing import waits_for_router
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.members import has_lead
 from quadriga.shared.runtime.clock import monotonic, wall_ns
@@ -45,14 +44,10 @@ def find_loss(bus: Bus, config: Config) -> Loss | None:
     return None
 
 
-def loss_error(loss: Loss, tick: int, missed_ns: int = 0, note: str = "") -> ProcessError:
-    """The error of a process that ends because of a loss.
+def loss_error(loss: Loss, tick: int, missed_ns: int = 0) -> ProcessError:
+    """The error of a process that ends because of a loss at a tick, ms.
 
-    Args:
-        loss: what has vanished.
-        tick: the team's time as far as this process knows it, ms.
-        missed_ns: when it was missed first, ns since 1970; 0: that is not known.
-        note: what this process has to say of itself, see `Standstill`.
+    `missed_ns` is when it was missed first, ns since 1970; 0: that is not known.
     """
     cause = "killed, failed, or cut off: see what it says itself"
     if loss.code == LINK_LOST:
@@ -61,17 +56,11 @@ def loss_error(loss: Loss, tick: int, missed_ns: int = 0, note: str = "") -> Pro
     if missed_ns:
         moment = datetime.fromtimestamp(1e-9 * missed_ns, UTC)
         got += f", missed since {moment.isoformat(timespec='milliseconds')[:-6]}Z"
-    return ProcessError(
-        loss.what, got, "it to be there until the walk's announced end", cause + note
-    )
+    return ProcessError(loss.what, got, "it to be there until the walk's announced end", cause)
 
 
 def missed_ns_of(line: str) -> int:
-    """When something was missed first, of a line that shows a `loss_error`; 0 of any other line.
-
-    Returns:
-        ns since 1970, to the ms.
-    """
+    """When something was missed, ns since 1970, of a line with a `loss_error`; 0 of any other."""
     found = _MISSED.search(line)
     if found is None:
         return 0
@@ -79,56 +68,41 @@ def missed_ns_of(line: str) -> int:
 
 
 class LossTimer:
-    """How long something is gone already, and whether it is gone for good.
-
-    A router may be started again. Then each process finds it by itself, so that who drives time is
-    absent for longer, too.
+    """Since when something is gone, and whether that is longer than `grace` seconds.
 
     Args:
         find: what is gone at the moment; None: nothing.
-        config: the team's configuration.
-        grace: s, after which a loss is one that has nothing to do with the router.
+        grace: s.
 
     Attributes:
         since: when the loss was seen first, s of the clock; None: there is none.
     """
 
-    def __init__(self, find: Callable[[], Loss | None], config: Config, grace: float) -> None:
+    def __init__(self, find: Callable[[], Loss | None], grace: float = 0.0) -> None:
         self._find, self._grace = find, grace
-        waits = waits_for_router(config)
-        self._of_link = max(grace, config.bus.reconnect_timeout) if waits else grace
-        self._patience = grace
         self.since: float | None = None
 
     def poll(self) -> Loss | None:
         """What is gone for good; None if all is there, or may be back."""
-        loss = self._find()
+        loss, now = self._find(), monotonic()
         if loss is None:
-            self.clear()
+            self.since = None
             return None
-        now = monotonic()
         if self.since is None:
             self.since = now
-        if loss.code == LINK_LOST:
-            self._patience = self._of_link
-        return loss if now - self.since >= self._patience else None
+        return loss if now - self.since >= self._grace else None
 
     @property
     def missed_ns(self) -> int:
         """When the loss was seen first, ns since 1970; 0: there is none."""
         return 0 if self.since is None else wall_ns() - round(1e9 * (monotonic() - self.since))
 
-    def clear(self) -> None:
-        """All is there again."""
-        self.since, self._patience = None, self._grace
-
 
 class Liveness:
     """Ends a process whose team is gone, and says what has vanished.
 
     The last packets of who drives time may arrive after its token has vanished, and they announce
-    the end of the walk. So a loss counts after `LAST_PACKETS`, and that of a router as `LossTimer`
-    tells.
+    the end of the walk. So a loss counts after `LAST_PACKETS`.
 
     Args:
         bus: the process's own, in the midst of a walk.
@@ -136,7 +110,7 @@ class Liveness:
     """
 
     def __init__(self, bus: Bus, config: Config) -> None:
-        self._timer = LossTimer(lambda: find_loss(bus, config), config, LAST_PACKETS)
+        self._timer = LossTimer(lambda: find_loss(bus, config), LAST_PACKETS)
         self._bus, self._config = bus, config
         self._walks = False
         self._silent_since: float | None = None  # since the end was announced
@@ -160,18 +134,15 @@ class Liveness:
             tick: the team's time as far as this process knows it, ms.
 
         Raises:
-            ProcessError: who drives time, or the link to the router, is gone for good.
+            ProcessError: who drives time, or the link to the router, is gone.
         """
         loss = self._timer.poll()
         if loss is not None:
-            note = self._bus.standstill.note
-            raise loss_error(loss, max(tick, 0), self._timer.missed_ns, note)
+            raise loss_error(loss, max(tick, 0), self._timer.missed_ns)
 
     def receive(self) -> None:
-        """Something has arrived: the team walks, and who was gone is back."""
-        self._silent_since = None
+        """Something has arrived: the team walks."""
+        self._silent_since = self._timer.since = None
         if not self._walks:
             self._walks = True
             log(f"{self._bus.name}: the team walks")
-        if self._timer.since is not None:
-            self._timer.clear()

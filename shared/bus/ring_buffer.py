@@ -18,9 +18,8 @@ class Mailbox(Generic[Item]):
     """A queue for many threads that put and one that takes.
 
     `queue.SimpleQueue` is no substitute: in Python 3.11 its `get` may wait for ever, whatever its
-    timeout, when a signal's handler or a busy computer takes up the time that was left. It then
-    computes a negative rest, which it takes for no limit. To put into and
-    take from a `queue.Queue` costs ten times as much.
+    timeout, when a signal's handler takes up the time that was left. `queue.Queue` costs ten times
+    as much.
 
     Args:
         most: how many items wait at most: one more drops the oldest, so that who is too slow for
@@ -65,11 +64,9 @@ class Mailbox(Generic[Item]):
 
 
 class Fresh(NamedTuple):
-    """What has come since the last poll.
+    """What has come since the last look: how many messages, and the newest of them, oldest first.
 
-    Attributes:
-        messages: how many came; fewer than were sent, where more came than are kept.
-        payloads: the newest of them, oldest first.
+    Fewer than were sent, where more came than are kept.
     """
 
     messages: int

@@ -1,19 +1,21 @@
-"""Zenoh's settings by role: only the endpoints of the configuration are opened, nothing else."""
+"""Where a process listens and connects, whom it trusts there, and what Zenoh is told of it all."""
 
 from __future__ import annotations
 
+import re
+import socket
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
-from quadriga.shared.config.endpoints import check_exposure, check_port, is_tls
+from quadriga.shared.bus.diagnostics import RECEIVE_BUFFER
+from quadriga.shared.config.endpoints import check_exposure, check_port, host_and_port, is_tls
 from quadriga.shared.config.sections import BusConfig
-from quadriga.shared.errors import BusError, ConfigError
-from quadriga.shared.members import LEADS
+from quadriga.shared.errors import BusError, ConfigError, QuadrigaError
+from quadriga.shared.members import LEADS, ROUTER
 
 NO_LINK: Final = "Unable to connect"  # how Zenoh says that nobody answers at an endpoint
 LEASE_MS: Final = 10_000  # of silence after which a link is given up: its process stands still
-RECEIVE_BUFFER: Final = 4 << 20  # bytes, of each link's socket
 # The others may start before the plant or the router: keep trying in the background.
 _RETRY: Final = {"period_init_ms": 20, "period_max_ms": 200, "period_increase_factor": 1.5}
 _COMMON: Final = {
@@ -39,9 +41,17 @@ _COMMON: Final = {
     "transport/unicast/accept_timeout": 2000,
 }
 
+OPEN: Final = "open"  # something listens there
+REFUSED: Final = "refused"
+SILENT: Final = "silent"
+UNRESOLVED: Final = "unresolved"
+UNREACHABLE: Final = "unreachable"
+UNTRIED: Final = "untried"
+_TIMEOUT: Final = 1.0  # s
+
 
 def member_settings(bus: BusConfig, name: str, *, hub: bool = False) -> dict[str, Any]:
-    """Settings of a process of the team.
+    """Zenoh's settings of a process of the team; only the configured endpoints are opened.
 
     Args:
         bus: the configuration.
@@ -66,11 +76,12 @@ def member_settings(bus: BusConfig, name: str, *, hub: bool = False) -> dict[str
         "connect/retry": _RETRY,
         "scouting/gossip/enabled": peer,
         **_COMMON,
+        **_certificates(bus, bus.endpoint, name, listens=False),
     }
 
 
 def router_settings(listen: str, bus: BusConfig, rules: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings of the router that clients connect to at endpoint `listen`.
+    """Zenoh's settings of the router that clients connect to at endpoint `listen`.
 
     Args:
         listen: where it listens.
@@ -89,16 +100,12 @@ def router_settings(listen: str, bus: BusConfig, rules: Mapping[str, Any]) -> di
         "scouting/gossip/enabled": False,
         **_COMMON,
         **rules,
+        **_certificates(bus, listen, ROUTER, listens=True),
     }
 
 
 def link_settings(bus: BusConfig, listen: str, links: Sequence[str]) -> dict[str, Any]:
-    """What a router is told besides of the other routers that it connects to.
-
-    Args:
-        bus: the configuration.
-        listen: where it listens itself.
-        links: the endpoints of the others.
+    """What a router that listens at `listen` is told besides of those at the endpoints `links`.
 
     Raises:
         ConfigError: one is open to others, or there are certificates: whoever is linked as a router
@@ -114,16 +121,29 @@ def link_settings(bus: BusConfig, listen: str, links: Sequence[str]) -> dict[str
     return {"connect/endpoints": list(links), **retry} if links else {}
 
 
+def _certificates(bus: BusConfig, endpoint: str, name: str, *, listens: bool) -> Mapping[str, Any]:
+    if not is_tls(endpoint):
+        return {}
+    from quadriga.shared.security.certificates import tls_files, tls_settings
+
+    return tls_settings(tls_files(bus.certificates, name), listens=listens)
+
+
 def opening_error(settings: dict[str, Any], at: str, name: str, error: str) -> BusError:
-    """The error of a process that cannot join the network.
+    """The error of a process `name` that cannot join the network.
 
     Args:
         settings: all of Zenoh's.
-        at: the last of them that was set.
+        at: the last of them that was set; Zenoh often does not say which one is wrong.
         name: the process.
         error: Zenoh's words.
     """
-    key, endpoint = _key_at_fault(settings, at, error)
+    connect, listen = settings["connect/endpoints"], settings["listen/endpoints"]
+    key, endpoint = "bus.endpoint", (connect or listen)[0]
+    # Who listens too connects in the background: only the form and the protocol are checked before.
+    protocol = f"not supported for {endpoint.partition('/')[0]} protocol"
+    if connect and listen and at != "connect/endpoints" and protocol not in error:
+        key, endpoint = "bus.listen", listen[0]
     if "in use" in error:
         cause = "another team or program listens there; choose another port"
     elif NO_LINK in error:
@@ -133,24 +153,77 @@ def opening_error(settings: dict[str, Any], at: str, name: str, error: str) -> B
     else:
         cause = "a name that does not resolve, or not of the form tcp/HOST:PORT"
     where = "sim server" if name in LEADS else name
-    return BusError(
-        f"{key} {endpoint!r} of {where}",
-        error.split(" at /")[0],
-        "an endpoint that can be opened",
-        cause,
-    )
+    got, expected = error.split(" at /")[0], "an endpoint that can be opened"
+    return BusError(f"{key} {endpoint!r} of {where}", got, expected, cause)
 
 
-def _key_at_fault(settings: dict[str, Any], at: str, error: str) -> tuple[str, str]:
-    """The key of the configuration that Zenoh's error is about, and its value.
+class Reach(NamedTuple):
+    """What came of the attempt to connect: one of the codes of this module, and it in words."""
 
-    Zenoh often does not say; `at` is the setting that was made last.
+    code: str
+    text: str
+
+
+def try_endpoint(endpoint: str, timeout: float = _TIMEOUT) -> Reach:
+    """Connect to an endpoint and close again, without a word.
+
+    That something listens there does not mean that it is Zenoh, nor, with TLS, that it trusts this
+    computer: only a handshake tells that.
     """
-    connect, listen = settings["connect/endpoints"], settings["listen/endpoints"]
-    if not (connect and listen):
-        return "bus.endpoint", (connect or listen)[0]
-    # Who listens too connects in the background: only the form and the protocol are checked before.
-    protocol = connect[0].partition("/")[0]
-    if at == "connect/endpoints" or f"not supported for {protocol} protocol" in error:
-        return "bus.endpoint", connect[0]
-    return "bus.listen", listen[0]
+    try:  # Zenoh's form: protocol/HOST:PORT, with settings of its own behind ? or #
+        host, port = host_and_port(re.split("[?#]", endpoint)[0])
+    except ConfigError:
+        host, port = "", 0
+    if not host or not endpoint.startswith(("tcp/", "tls/")):
+        return Reach(UNTRIED, f"{endpoint} was not tried: only tcp and tls can be")
+    try:
+        socket.create_connection((host, port), timeout).close()
+    except socket.gaierror:
+        return Reach(UNRESOLVED, f"the name {host} does not resolve here")
+    except (ConnectionRefusedError, ConnectionResetError):
+        return Reach(REFUSED, f"nobody listens at {endpoint}")
+    except TimeoutError:
+        why = "it is off, in another network, or behind a firewall"
+        return Reach(SILENT, f"{host} does not answer within {timeout:g} s: {why}")
+    except OSError as error:
+        return Reach(UNREACHABLE, f"{endpoint} cannot be reached: {error}")
+    return Reach(OPEN, f"something listens at {endpoint}")
+
+
+def check_trust(bus: BusConfig, name: str) -> None:
+    """Whether process `name` and the router trust each other, if they ask for it.
+
+    Zenoh takes who is not trusted for one that is not there yet.
+
+    Raises:
+        BusError: nobody answers, or one does not trust the other; it says who and why.
+        ConfigError: a certificate is missing or cannot be used.
+    """
+    if not is_tls(bus.endpoint):
+        return
+    from quadriga.shared.security import handshake
+    from quadriga.shared.security.certificates import tls_files
+
+    found = handshake.shake_hands(bus.endpoint, tls_files(bus.certificates, name))
+    if found.outcome != handshake.TRUSTED:
+        got = NO_LINK if found.outcome == handshake.UNREACHABLE else found.outcome
+        raise BusError(
+            f"bus.endpoint {bus.endpoint!r} of {name}",
+            f"{got}: {found.detail}",
+            "a router that is trusted and trusts this process",
+            handshake.CAUSES[found.outcome],
+        )
+
+
+def describe_way(bus: BusConfig, name: str) -> str:
+    """How `bus.endpoint` is reached from here by process `name`; takes seconds if nobody answers.
+
+    Zenoh itself never says why there is no link.
+    """
+    if not is_tls(bus.endpoint):
+        return try_endpoint(bus.endpoint).text
+    try:
+        check_trust(bus, name)
+    except QuadrigaError as error:
+        return f"{error.name}: {error.got} ({error.cause})"
+    return f"the router at {bus.endpoint} and {name} trust each other"

@@ -115,14 +115,6 @@ class BusConfig:
         False, "permit others than tls off the loopback: whoever reaches them commands the robots"
     )
     barrier_timeout: float = number(60.0, "s", 0.1, 3600.0, "how long to wait for all processes")
-    reconnect_timeout: float = number(
-        30.0,
-        "s",
-        0.0,
-        600.0,
-        "client mode, realtime, one plant: how long processes wait for a router that is gone to be "
-        "back, before they leave; meanwhile simulated robots are led down",
-    )
     clock_timeout: float = number(
         0.5, "s", 0.3, 10.0, "realtime: age of a plant's newest message at which the walk ends"
     )

@@ -31,11 +31,7 @@ def recorded_config(recording: Recording | DamagedRecording) -> Config:
     """
     found = recording.metadata
     try:
-        return _build(found.get("config_json", ""))
-    except _NoConfigurationError:
-        raise RecordingError(
-            str(recording.path), "metadata without a configuration", "config_json in the metadata"
-        ) from None
+        config = _build(found.get("config_json", ""))
     except ConfigError as error:
         raise RecordingError(
             f"configuration of {recording.path}",
@@ -43,27 +39,21 @@ def recorded_config(recording: Recording | DamagedRecording) -> Config:
             error.expected,
             error.cause if error.name == "planner.kind" else _OTHER_VERSION,
         ) from None
-    except RecursionError:  # in the words about a value that nests as deeply as JSON permits
-        raise RecordingError(
-            f"configuration of {recording.path}",
-            "values nested in values",
-            "sections of keys",
-            "recorded by something else than quadriga",
-        ) from None
-
-
-class _NoConfigurationError(Exception):
-    """The text is no table of sections."""
+    if config is None:
+        got, expected = "metadata without a configuration", "config_json in the metadata"
+        raise RecordingError(str(recording.path), got, expected)
+    return config
 
 
 @lru_cache(maxsize=8)  # every reader of a recording asks, and a configuration does not change
-def _build(text: str) -> Config:
+def _build(text: str) -> Config | None:
+    """The configuration; None if the text is no table of sections."""
     try:
         sections = json.loads(text)
     except (ValueError, RecursionError):  # the latter for what nests too deeply
-        raise _NoConfigurationError from None
+        return None
     if not isinstance(sections, dict):
-        raise _NoConfigurationError
+        return None
     keys = flatten(sections)
     for name in flatten(asdict(Config())):
         if name not in keys:

@@ -24,10 +24,6 @@ _REASONS: Final[Mapping[str, str]] = {
 }
 
 
-def _is_of_table(key: str) -> bool:
-    return find_topic(key)[0] is not None
-
-
 class Quota:
     """Decides of each message whether it is stored, and counts those that are not.
 
@@ -38,11 +34,13 @@ class Quota:
 
     Attributes:
         refused: messages that were not stored, by reason: `OVERSIZED`, or `REFUSED` of what others
-            send beyond `MAX_FOREIGN_KEYS` and `MAX_FOREIGN_BYTES`.
+            send beyond `MAX_FOREIGN_KEYS` and `MAX_FOREIGN_BYTES`, in all files together.
     """
 
     def __init__(
-        self, is_own: Callable[[str], bool] = _is_of_table, largest: int = LARGEST
+        self,
+        is_own: Callable[[str], bool] = lambda key: find_topic(key)[0] is not None,
+        largest: int = LARGEST,
     ) -> None:
         self.is_own, self._largest = is_own, largest
         self._foreign: set[str] = set()
@@ -51,31 +49,25 @@ class Quota:
 
     def admits_key(self, key: str, known: int) -> bool:
         """Whether there is room for a key in a file that has `known` of them; counts if not."""
-        if known < MAX_KEYS and (self.is_own(key) or self._has_room(key)):
-            return True
-        self.refused[REFUSED] += 1
-        return False
+        room = len(self._foreign) < MAX_FOREIGN_KEYS and len(key) <= LONGEST_KEY
+        own = self.is_own(key)
+        if known >= MAX_KEYS or not (own or room or key in self._foreign):
+            self.refused[REFUSED] += 1
+            return False
+        if not own:
+            self._foreign.add(key)
+        return True
 
     def admits_payload(self, size: int, *, own: bool) -> bool:
         """Whether a payload of so many bytes of an admitted key is stored; counts if not."""
-        if size > self._largest:
-            self.refused[OVERSIZED] += 1
-            return False
-        if own:
-            return True
-        if self._bytes + size > MAX_FOREIGN_BYTES:
-            self.refused[REFUSED] += 1
-            return False
-        self._bytes += size
-        return True
-
-    def _has_room(self, key: str) -> bool:
-        """Whether one more foreign key is taken; it then counts in every file."""
-        if key not in self._foreign:
-            if len(self._foreign) >= MAX_FOREIGN_KEYS or len(key) > LONGEST_KEY:
-                return False
-            self._foreign.add(key)
-        return True
+        reason = OVERSIZED if size > self._largest else ""
+        if not own and self._bytes + size > MAX_FOREIGN_BYTES:
+            reason = reason or REFUSED
+        if reason:
+            self.refused[reason] += 1
+        elif not own:
+            self._bytes += size
+        return not reason
 
 
 def describe_refused(refused: Mapping[str, int]) -> list[str]:

@@ -6,10 +6,8 @@ read: chunks that are packed or not, records outside of any, checksums and index
 
 from __future__ import annotations
 
-import json
 import struct
 import zlib
-from collections import Counter
 from collections.abc import Container, Iterator
 from contextlib import suppress
 from io import SEEK_CUR, SEEK_END, BytesIO
@@ -21,19 +19,17 @@ import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.reader import make_reader
-from mcap.records import Channel, Chunk, Footer, Metadata, Schema
+from mcap.records import Channel, Chunk, Footer, Metadata
 from mcap.writer import MCAP0_MAGIC
 
 from quadriga.shared.codec import decode, envelope
 from quadriga.shared.errors import RecordingError, name_file_errors
 from quadriga.shared.messages import Message
-from quadriga.shared.recording.metadata import PROFILE, newer_format_error, unseal
+from quadriga.shared.recording.metadata import PROFILE, unseal
 from quadriga.shared.topics import TABLE, find_topic, topic_of
 
 M = TypeVar("M", bound=Message)
 
-BARE: Final = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)  # in chunks, and outside of any
 RECORD: Final = struct.Struct("<BQ")  # opcode, length
 LARGEST_CHUNK: Final = 1 << 27  # bytes unpacked; `recorder.chunk_kib` is half of that at most
 # What the MCAP library, LZ4 and Zstandard raise on bytes that are no record.
@@ -44,7 +40,7 @@ CORRUPT: Final = (
 
 _MESSAGE: Final = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log, publish
 _LATEST: Final = (1 << 63) - 1  # ns: what MCAP has 64 bits for, tables have 63 and a sign
-_KNOWN: Final = {f"quadriga.{topic.type.__name__}": topic.type.SCHEMA for topic in TABLE}
+_BARE: Final = (Opcode.CHANNEL, Opcode.MESSAGE)  # in chunks, and outside of any
 _RECOVER: Final = "`quadriga recover` writes what is readable"
 _MEND: Final = f"one cut or damaged in its first bytes: {_RECOVER}"
 _PART: Final = 1 << 20  # bytes that are read at once
@@ -53,10 +49,7 @@ _FOOTER: Final = RECORD.size + 20  # bytes
 
 
 class ChunkEntry(NamedTuple):
-    """One recorded message.
-
-    `tick` is -1 where the message carries none that can be read.
-    """
+    """One recorded message; `tick` is -1 where it carries none that can be read."""
 
     key: str
     tick: int
@@ -105,20 +98,15 @@ class Recording:
             names: only topics of these names (`Topic.name`); None gives every message, also of
                 keys outside the table.
             keys: only these keys; None gives all.
-
-        Raises:
-            RecordingError: the messages are of a schema later than this version's.
         """
         wanted: dict[int, str | None] = {}
         for opcode, content in self._records(skip=Opcode.METADATA):
-            if opcode != Opcode.CHUNK and opcode not in BARE:
-                continue
             try:
-                bare = opcode in BARE
-                inside = (
-                    RECORD.pack(opcode, len(content)) + content if bare else content_of(content)
-                )
-                yield from messages_of(inside, wanted, str(self.path), names, keys)
+                if opcode == Opcode.CHUNK:
+                    yield from messages_of(content_of(content), wanted, names, keys)
+                elif opcode in _BARE:
+                    record = RECORD.pack(opcode, len(content)) + content
+                    yield from messages_of(record, wanted, names, keys)
             except CORRUPT as error:
                 self.cut = f"a chunk of {len(content)} bytes is corrupt ({error})"
                 return
@@ -148,14 +136,11 @@ class Recording:
             end = file.read(_FOOTER)
             footer = Footer.read(stream(end[RECORD.size :]))
             start = footer.summary_start or footer_at  # 0: no summary
-            if end[:1] != bytes([Opcode.FOOTER]) or not _DATA_END < start < self._size:
-                raise self._damage_error("an index that is not where it should be")
-            file.seek(start - _DATA_END)
+            file.seek(max(min(start, self._size) - _DATA_END, 0))
             data_end = file.read(_DATA_END)
-            if data_end[: RECORD.size] != RECORD.pack(Opcode.DATA_END, 4):
-                raise self._damage_error("content that does not end where it should")
-            summary = file.read(self._size - len(MCAP0_MAGIC) - 4 - start)
-            if footer.summary_crc and zlib.crc32(summary) != footer.summary_crc:
+            summary = file.read(max(self._size - len(MCAP0_MAGIC) - 4 - start, 0))
+            there = end[0] == Opcode.FOOTER and data_end.startswith(RECORD.pack(Opcode.DATA_END, 4))
+            if not there or footer.summary_crc not in (0, zlib.crc32(summary)):
                 raise self._damage_error("an index that fails its checksum")
             crc = int.from_bytes(data_end[RECORD.size :], "little")
             if crc and _crc(file, start - _DATA_END) != crc:
@@ -179,20 +164,6 @@ class Recording:
         self.cut = cut
         notes.pop(PROFILE, None)
         return notes
-
-    def indexed_counts(self) -> dict[str, int] | None:
-        """Messages by key, sorted, from the index alone; None of a file that is cut or damaged."""
-        with self.path.open("rb") as file:
-            try:
-                summary = make_reader(file).get_summary()
-            except (*CORRUPT, StopIteration):
-                return None
-        if summary is None or summary.statistics is None:
-            return None
-        counts: Counter[str] = Counter()
-        for number, channel in summary.channels.items():
-            counts[channel.topic] += summary.statistics.channel_message_counts.get(number, 0)
-        return dict(sorted(counts.items()))
 
     def _damage_error(self, got: str) -> RecordingError:
         cause = f"was the recorder killed, or the disk full? {_RECOVER}"
@@ -218,26 +189,19 @@ class Recording:
     def _metadata(self) -> dict[str, str]:
         for opcode, content in self._records(skip=Opcode.MESSAGE_INDEX):
             if opcode == Opcode.METADATA:
-                try:
+                with suppress(*CORRUPT):
                     record = Metadata.read(stream(content))
-                except CORRUPT:
-                    break
-                if record.name == PROFILE:
-                    return unseal(record.metadata, str(self.path))
+                    if record.name == PROFILE:
+                        return unseal(record.metadata, str(self.path))
             if opcode == Opcode.CHUNK:
                 break
-        raise RecordingError(
-            str(self.path),
-            "no metadata of this project",
-            "a recording made by `quadriga`",
-            f"a foreign MCAP file, or {_MEND}",
-        )
+        got, expected = "no metadata of this project", "a recording made by `quadriga`"
+        raise RecordingError(str(self.path), got, expected, f"a foreign MCAP file, or {_MEND}")
 
 
 def messages_of(
     chunk: bytes,
     wanted: dict[int, str | None],
-    path: str,
     names: Container[str] | None = None,
     keys: Container[str] | None = None,
 ) -> Iterator[ChunkEntry]:
@@ -246,12 +210,10 @@ def messages_of(
     Args:
         chunk: its records, uncompressed.
         wanted: keys by channel, None for one that is not wanted; learns them as they pass by.
-        path: the file's, for the error.
         names: of topics that are wanted; None: all, also of keys outside the table.
         keys: that are wanted; None: all.
 
     Raises:
-        RecordingError: the messages are of a schema later than this version's.
         one of CORRUPT: the chunk holds what are no records.
     """
     at = 0
@@ -259,14 +221,11 @@ def messages_of(
         if chunk[at] != Opcode.MESSAGE:
             opcode, length = RECORD.unpack_from(chunk, at)
             at += RECORD.size
-            if opcode == Opcode.CHANNEL:
-                channel_id = int.from_bytes(chunk[at : at + 2], "little")
-                if channel_id not in wanted:  # every chunk repeats them
-                    key = Channel.read(stream(chunk[at : at + length])).topic
-                    named = names is None or name_of(key) in names
-                    wanted[channel_id] = key if named and (keys is None or key in keys) else None
-            elif opcode == Opcode.SCHEMA:
-                check_schema(Schema.read(stream(chunk[at : at + length])), path)
+            channel_id = int.from_bytes(chunk[at : at + 2], "little")
+            if opcode == Opcode.CHANNEL and channel_id not in wanted:  # every chunk repeats them
+                key = Channel.read(stream(chunk[at : at + length])).topic
+                named = names is None or name_of(key) in names
+                wanted[channel_id] = key if named and (keys is None or key in keys) else None
             at += length
             continue
         _, length, channel_id, _, log_time, _ = _MESSAGE.unpack_from(chunk, at)
@@ -308,20 +267,6 @@ def content_of(record: bytes) -> bytes:
 def stream(content: bytes) -> ReadDataStream:
     """The content of a record for the MCAP library."""
     return ReadDataStream(BytesIO(content))
-
-
-def check_schema(schema: Schema, path: str) -> None:
-    """Raise RecordingError if a schema is later than this version's."""
-    mine = _KNOWN.get(schema.name)
-    if mine is None:
-        return
-    try:
-        version = json.loads(schema.data)["properties"]["schema"]["const"]
-    except (ValueError, TypeError, LookupError, RecursionError):
-        return
-    if isinstance(version, int) and version > mine:
-        got = f"messages {schema.name} of schema {version}"
-        raise newer_format_error(path, got, f"schema {mine}")
 
 
 def name_of(key: str) -> str:

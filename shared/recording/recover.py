@@ -1,4 +1,4 @@
-"""What is left of a damaged recording: every intact chunk, and every record outside chunks."""
+"""What is left of a damaged recording: every intact chunk, and the metadata."""
 
 from __future__ import annotations
 
@@ -16,10 +16,9 @@ from mcap import records
 from mcap.opcode import Opcode
 from mcap.writer import MCAP0_MAGIC
 
-from quadriga.shared.errors import NewerRecordingError, RecordingError, system_reason
+from quadriga.shared.errors import RecordingError, name_file_errors
 from quadriga.shared.recording.metadata import PROFILE, unseal
 from quadriga.shared.recording.reader import (
-    BARE,
     CORRUPT,
     RECORD,
     ChunkEntry,
@@ -29,16 +28,12 @@ from quadriga.shared.recording.reader import (
     stream,
 )
 
-_KINDS: Final = {code: getattr(records, code.name.title().replace("_", "")) for code in Opcode}
-_OPAQUE: Final = (Opcode.MESSAGE, Opcode.ATTACHMENT)  # nothing in them tells where they end
-_PRIVATE: Final = 0x80  # opcodes from here on are other programs' own
-_HEAD: Final = re.compile(rb"(?s)[\x01-\x0f].{4}\0{4}")  # of a record below 4 GiB
+_HEAD: Final = re.compile(rb"(?s)[\x01-\x0f\x80-\xff].{4}\0{4}")  # of a record below 4 GiB
 # A chunk's record: opcode, length, first and last log time, size, checksum, packing, packed size.
 _CHUNK: Final = struct.Struct("<BQQQQI")
-_ANY_CHUNK: Final = re.compile(
-    rb"\x06.{4}\0{4}.{28}(?:\0{4}|\x03\0{3}lz4|\x04\0{3}zstd)", re.DOTALL
+_KEPT: Final = re.compile(  # what a chunk or metadata begins with
+    rb"\x06.{4}\0{4}.{28}(?:\0{4}|\x03\0{3}lz4|\x04\0{3}zstd)|\x0c.{4}\0{4}", re.DOTALL
 )
-_LARGEST: Final = 1 << 20  # bytes of a record, other than a chunk, that is looked for in damage
 _HEADER: Final = 64  # bytes within which a file's header names the program that wrote it
 _CUT: Final = "the file ends in the middle"
 
@@ -69,8 +64,8 @@ class Damage:
 class DamagedRecording:
     """A damaged recording, read as far as it can be.
 
-    Where no record begins, the next place is looked for at which one does. Messages outside
-    chunks have no checksum: in a file that has chunks, none is believed after such a place.
+    Where no record begins, the next intact chunk, or metadata, is looked for. Messages outside
+    chunks have no checksum: they are not believed.
 
     Attributes:
         metadata: what the writer was given, {} if no copy of it is intact.
@@ -82,177 +77,104 @@ class DamagedRecording:
         """Open a file.
 
         Raises:
-            RecordingError: no such file, an empty one, one in which nothing of a recording of
-                this project is left, or one of a newer format.
+            RecordingError: no such file, an empty one, or one in which nothing of a recording of
+                this project is left.
         """
         self.path = path
         self.damages: list[Damage] = []
         self.metadata: dict[str, str] = {}
         self.notes: dict[str, dict[str, str]] = {}
-        try:
-            with path.open("rb") as file:
+        with name_file_errors(RecordingError, path, "a recording"), path.open("rb") as file:
+            try:
                 self._file = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
-        except ValueError:
-            raise RecordingError(str(path), "an empty file", "a recording") from None
-        except OSError as error:
-            raise RecordingError(str(path), system_reason(error), "a recording") from None
-        self._chunked = _ANY_CHUNK.search(self._file) is not None
-        self._pieces = list(self._scan())
+            except ValueError:
+                raise RecordingError(str(path), "an empty file", "a recording") from None
+        self._chunks = list(self._scan())
         self._scanned = tuple(self.damages)
         named = any(name.startswith(PROFILE) for name in self.notes)
         if self.metadata or named or PROFILE.encode() in self._file[:_HEADER]:
             return
-        if any(name_of(entry.key) for entry in self.entries()):
-            return
-        if not self.damages:
+        if not any(name_of(entry.key) for entry in self.entries()):
             raise RecordingError(
                 str(path),
-                "a whole MCAP file of another program",
+                f"{len(self._file):,} bytes that hold nothing of a recording",
                 "a recording made by `quadriga`",
-                "it holds no message of a team",
+                "a file of another program, or nothing is left",
             )
-        raise RecordingError(
-            str(path),
-            f"{len(self._file):,} bytes that hold nothing of a recording",
-            "a damaged recording made by `quadriga`",
-            "a foreign file, or nothing is left",
-        )
 
     def entries(self) -> Iterator[ChunkEntry]:
-        """Every message that can be read, in the order of the file.
-
-        Raises:
-            RecordingError: the messages are of a schema later than this version's.
-        """
+        """Every message that can be read, in the order of the file."""
         self.damages = list(self._scanned)
         keys = self._indexed_keys()
-        for at, end in self._pieces:
+        for at, end in self._chunks:
             try:
-                yield from messages_of(self._content(at, end), keys, str(self.path))
+                content = content_of(self._file[at + RECORD.size : end])
+                yield from messages_of(content, keys)
             except CORRUPT as error:  # of another program: its checksum is right
                 self.damages.append(Damage(at, end - at, f"a foreign chunk ({error})"))
         self.damages.sort(key=lambda damage: damage.at)
 
     def _scan(self) -> Iterator[tuple[int, int]]:
-        """Begin and end of every chunk, and every record outside one, that holds messages.
-
-        Notes damages, and metadata as they pass by.
-        """
+        """Begin and end of every intact chunk. Notes damages, and metadata as they pass by."""
         file, size = self._file, len(self._file)
-        magic = file[: len(MCAP0_MAGIC)] == MCAP0_MAGIC
-        at = lost = min(len(MCAP0_MAGIC), size)  # `lost`: since where no record was found
-        if not magic:
-            self._note(0, at, "not the beginning of an MCAP file")
+        at = min(len(MCAP0_MAGIC), size)
+        if file[:at] != MCAP0_MAGIC:
+            self.damages.append(Damage(0, at, "not the beginning of an MCAP file"))
         done = size - len(MCAP0_MAGIC) if file[-len(MCAP0_MAGIC) :] == MCAP0_MAGIC else size
         while at < done:
-            end = self._end_of(at, sure=at == lost)
-            if end:
-                if at > lost:
-                    self._note(lost, at - lost, "no record begins here")
-                if file[at] == Opcode.CHUNK or file[at] in BARE:
-                    yield at, end
-                at = lost = end
-            elif at == lost and (end := self._end_of_bad(at)):
-                at = lost = end
-            else:
-                found = _HEAD.search(file, at + 1)
-                at = found.start() if found else done
-        if lost < done or done == size:
-            self._note(lost, done - lost, _CUT)
+            end = self._end_of(at)
+            if end and file[at] == Opcode.CHUNK:
+                yield at, end
+            at = end or self._pass_damage(at, done)
+        if done == size and not (self.damages and self.damages[-1].what == _CUT):
+            self.damages.append(Damage(done, 0, _CUT))
 
-    def _end_of(self, at: int, *, sure: bool) -> int:
-        """End of the intact record at a byte, 0 if there is none.
-
-        Args:
-            at: the byte.
-            sure: whether the record before it ends there; else much else might look like one.
-        """
-        file, opcode = self._file, self._file[at]
-        if len(file) - at < RECORD.size:
-            return 0
-        if opcode == Opcode.CHUNK:
-            end = self._end_of_chunk(at)
-            with suppress(*CORRUPT):
-                return end if end and self._content(at, end) is not None else 0
-            return 0
-        length: int = RECORD.unpack_from(file, at)[1]
-        end = at + RECORD.size + length
-        if end > len(file) or not (sure or length <= _LARGEST):
-            return 0
-        if opcode in BARE and self._chunked and not sure:
-            return 0
-        exact = False
-        if opcode in _KINDS and opcode not in _OPAQUE:
-            content = stream(file[at + RECORD.size : end])
-            try:
-                record = _KINDS[Opcode(opcode)].read(content)
-            except CORRUPT:
-                return 0
-            exact = content.count == length
-            if opcode == Opcode.METADATA and not self._keep(record):
-                return 0
-        elif opcode not in _OPAQUE and opcode < _PRIVATE:
-            return 0
-        return end if (exact and sure) or self._is_head(end) else 0
-
-    def _end_of_bad(self, at: int) -> int:
-        """End of the damaged chunk or metadata at a byte, of which a note is taken; 0: neither."""
+    def _end_of(self, at: int) -> int:
+        """End of the intact record at a byte, 0 if there is none."""
         file = self._file
-        if len(file) - at < RECORD.size or file[at] not in (Opcode.CHUNK, Opcode.METADATA):
+        if not _HEAD.match(file, at):
             return 0
-        end: int = at + RECORD.size + RECORD.unpack_from(file, at)[1]
-        if end >= len(file) or not self._is_head(end):
-            return 0
-        if file[at] == Opcode.METADATA:
-            self._note(at, end - at, "metadata that cannot be read")
+        end = at + RECORD.size + int(RECORD.unpack_from(file, at)[1])
+        content = file[at + RECORD.size : end]
+        with suppress(*CORRUPT):
+            if file[at] == Opcode.CHUNK:
+                return end if content_of(content) else 0
+            if not self._is_head(end):
+                return 0
+            if file[at] == Opcode.METADATA:
+                return end if self._keep(records.Metadata.read(stream(content))) else 0
+            return end
+        return 0
+
+    def _pass_damage(self, at: int, done: int) -> int:
+        """Where the next record may begin after a byte at which none that is intact does."""
+        file, what, times = self._file, "no record begins here", None
+        end = at + RECORD.size + int.from_bytes(file[at + 1 : at + RECORD.size], "little")
+        if file[at] == Opcode.CHUNK and end < done and self._is_head(end):
+            what, times = "a chunk that fails its checksum", _CHUNK.unpack_from(file, at)[2:4]
         else:
-            times = _CHUNK.unpack_from(file, at)[2:4] if end - at >= _CHUNK.size else None
-            self.damages.append(Damage(at, end - at, "a chunk that fails its checksum", times))
+            starts = (found.start() for found in _KEPT.finditer(file, at + 1))
+            end = next((start for start in starts if self._end_of(start)), done)
+            if end == done == len(file):
+                what = _CUT
+        self.damages.append(Damage(at, end - at, what, times))
         return end
 
     def _is_head(self, at: int) -> bool:
         """Whether a record, or the end of the file, may be at a byte."""
-        head = self._file[at : at + RECORD.size]
-        if len(head) < RECORD.size:
-            return not head or head == MCAP0_MAGIC or head[0] in _KINDS
-        return _HEAD.fullmatch(head) is not None or head[0] >= _PRIVATE
-
-    def _end_of_chunk(self, at: int) -> int:
-        """End of the chunk at a byte, by the size of what is packed in it; 0 if that cannot be."""
-        file, begin = self._file, at + _CHUNK.size
-        packing = int.from_bytes(file[begin : begin + 4], "little")
-        begin += 4 + packing
-        if packing > len("zstd") or begin + 8 > len(file):
-            return 0
-        end = begin + 8 + int.from_bytes(file[begin : begin + 8], "little")
-        return end if end <= len(file) else 0
-
-    def _content(self, at: int, end: int) -> bytes:
-        """The records in a chunk, or the one outside of any.
-
-        Raises:
-            one of CORRUPT: a damaged chunk.
-        """
-        if self._file[at] != Opcode.CHUNK:
-            return self._file[at:end]
-        return content_of(self._file[at + RECORD.size : end])
-
-    def _note(self, at: int, size: int, what: str) -> None:
-        self.damages.append(Damage(at, size, what))
+        rest = self._file[at : at + RECORD.size]
+        return rest in (b"", MCAP0_MAGIC) or _HEAD.fullmatch(rest) is not None
 
     def _keep(self, record: records.Metadata) -> bool:
         """Keep metadata; False if they are damaged."""
-        if record.name == PROFILE:
-            try:
-                values = unseal(record.metadata, str(self.path))
-            except NewerRecordingError:
-                raise
-            except RecordingError:
-                return False
-            self.metadata = self.metadata or values
-        else:
+        if record.name != PROFILE:
             self.notes.setdefault(record.name, dict(record.metadata))
-        return True
+            return True
+        with suppress(RecordingError):
+            values = unseal(record.metadata, str(self.path))
+            self.metadata = self.metadata or values
+            return True
+        return False
 
     def _indexed_keys(self) -> dict[int, str | None]:
         """Keys by channel from the index at the file's end, if that is intact."""
@@ -262,6 +184,6 @@ class DamagedRecording:
             footer = records.Footer.read(stream(file[end - 20 : end]))
             start = footer.summary_start
             if 0 < start < end and zlib.crc32(file[start : end - 4]) == footer.summary_crc:
-                for _ in messages_of(file[start : end - 20 - RECORD.size], keys, str(self.path)):
+                for _ in messages_of(file[start : end - 20 - RECORD.size], keys):
                     pass
         return keys

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Final
 
 from quadriga.shared.codec import decode
@@ -51,13 +52,10 @@ class TickTrack:
             return
         if self.first < 0:
             self.first = tick
-        if self.last < 0 or self._period == 0:
-            self.last = tick
-            return
-        step = tick - self.last
-        if not 0 < step < _JUMP:
-            return
-        if step > self._period:
+        if self.last >= 0 and self._period > 0:
+            step = tick - self.last
+            if not 0 < step < _JUMP:
+                return
             missing = (step - 1) // self._period
             self.lost += missing
             if missing and len(self.gaps) < _KEPT:
@@ -77,10 +75,7 @@ def lost_by_key(tracks: Mapping[str, TickTrack]) -> dict[str, int]:
 class SkippedTicks:
     """Finds in a team's messages which ticks agents that are late in real time have skipped.
 
-    They send no command then, and none is lost.
-
-    Args:
-        config: the team's configuration. In lock-step an agent has to answer every tick.
+    They send no command then, and none is lost. In lock-step an agent has to answer every tick.
     """
 
     def __init__(self, config: Config) -> None:
@@ -91,18 +86,10 @@ class SkippedTicks:
     def find(self, key: str, payload: bytes) -> tuple[str, int] | None:
         """Key of the commands that an agent says it did not send, and how many of them.
 
-        Args:
-            key: of any message.
-            payload: the message as sent.
-
-        Returns:
-            None of a message that says nothing about it, or that none was skipped.
+        None of a message that says nothing about it, or that none was skipped.
         """
-        command = self._commands.get(key)
-        if command is None:
-            return None
-        try:
-            passed = decode(payload, Consumed).passed
-        except MessageError:
-            return None
-        return (command, passed) if passed > 0 else None
+        if key in self._commands:
+            with suppress(MessageError):
+                passed = decode(payload, Consumed).passed
+                return (self._commands[key], passed) if passed > 0 else None
+        return None

@@ -36,14 +36,13 @@ from mcap.records import (
 from mcap.writer import MCAP0_MAGIC
 
 from quadriga.shared.codec import envelope
-from quadriga.shared.errors import RecordingError, system_reason
+from quadriga.shared.errors import RecordingError, name_file_errors
 from quadriga.shared.recording.metadata import COUNTS, LOST, PROFILE, SINCE, seal
 from quadriga.shared.recording.quota import Quota
 from quadriga.shared.recording.ticks import TickTrack, lost_by_key
 from quadriga.shared.schema import json_schema
-from quadriga.shared.topics import TABLE, Topic, find_topic
+from quadriga.shared.topics import TABLE, find_topic
 
-_UNKNOWN: Final = f"{PROFILE}.unknown"
 _MESSAGE: Final = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log, publish
 _MESSAGE_FIELDS: Final = 22  # bytes of a message record's content before the payload
 _FOOTER: Final = struct.Struct("<BQQQ")  # opcode, length, summary, offsets; a checksum follows
@@ -90,22 +89,24 @@ class RecordingWriter:
         """
         self.quota = quota or Quota()
         self.messages = self.unreadable = 0
-        try:
+        if path.exists():
+            cause = "recordings are never overwritten"
+            raise RecordingError(str(path), "a file that exists", "a new one", cause)
+        with name_file_errors(RecordingError, path, "a writable folder"):
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file = path.open("xb")
-        except OSError as error:
-            if path.exists():
-                raise RecordingError(
-                    str(path), "a file that exists", "a new one", "recordings are never overwritten"
-                ) from None
-            raise RecordingError(str(path), system_reason(error), "a writable folder") from None
         self._mcap = McapFile(self._file, chunk_kib * 1024, PROFILE, "quadriga")
         self._metadata = seal(metadata)
         self._mcap.metadata(PROFILE, self._metadata)
-        self._schemas = {topic.name: self._schema(topic) for topic in TABLE}
-        self._unknown = self._mcap.schema(
-            _UNKNOWN, '{"description":"a key outside the table of topics"}'
-        )
+        self._schemas = {
+            topic.name: self._mcap.schema(
+                f"{PROFILE}.{topic.type.__name__}",
+                json.dumps(json_schema(topic.type), ensure_ascii=False),
+            )
+            for topic in TABLE
+        }
+        outside = '{"description":"a key outside the table of topics"}'
+        self._unknown = self._mcap.schema(f"{PROFILE}.unknown", outside)
         self._end_size = 1024 + sum(len(k) + len(v) + 8 for k, v in self._metadata.items())
         self._channels: dict[str, tuple[int, TickTrack, bool]] = {}  # the last: of the team
         self._periods, self._after = periods or {}, after or {}
@@ -150,9 +151,8 @@ class RecordingWriter:
         """
         self._mcap.flush()
         if not os.fstat(self._file.fileno()).st_nlink:
-            raise RecordingError(
-                self._file.name, "a file that was deleted", "one that stays while the team walks"
-            )
+            expected = "one that stays while the team walks"
+            raise RecordingError(self._file.name, "a file that was deleted", expected)
 
     def finish(self) -> None:
         """Write counters and index and close the file; a second call does nothing.
@@ -177,10 +177,6 @@ class RecordingWriter:
 
     def __exit__(self, *_: object) -> None:
         self.finish()
-
-    def _schema(self, topic: Topic) -> int:
-        text = json.dumps(json_schema(topic.type), ensure_ascii=False)
-        return self._mcap.schema(f"{PROFILE}.{topic.type.__name__}", text)
 
     def _channel(self, key: str) -> tuple[int, TickTrack, bool]:
         topic, _ = find_topic(key)

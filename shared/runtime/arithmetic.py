@@ -1,4 +1,4 @@
-"""What the last bits of a sum depend on, besides the code: the machine and its libraries.
+"""What the last bits of a sum depend on, besides the code: machine, libraries and threads.
 
 OpenBLAS, numpy and the C library each choose their kernels by the processor they find. These add
 and multiply in another order, or fuse the two, and so differ in the last bits. With the golden
@@ -24,7 +24,7 @@ import llvmlite.binding
 import numba
 import numpy as np
 import scipy.linalg  # noqa: F401  (loads the BLAS that is asked about)
-from threadpoolctl import threadpool_info
+from threadpoolctl import threadpool_info, threadpool_limits
 
 _DECIDES_NOTHING: Final = ("cpu", "numba's processor")  # for a reader: they decide on no bit
 _PACKAGES: Final = ("numpy", "scipy", "numba", "llvmlite", "pin", "libpinocchio", "daqp")
@@ -65,6 +65,15 @@ def arithmetic_digest() -> str:
     deciding = {k: v for k, v in arithmetic().items() if k not in _DECIDES_NOTHING}
     text = json.dumps([deciding, bool(numba.config.DISABLE_JIT)], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:8]
+
+
+def use_one_blas_thread() -> None:
+    """Hold BLAS to one thread from now on.
+
+    It sums in another order with another number of threads, so that the last bits of a plan would
+    tell how many cores the machine has; and agents on one machine would fight for them.
+    """
+    threadpool_limits(limits=1)
 
 
 def _libm() -> str:

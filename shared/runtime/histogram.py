@@ -16,31 +16,25 @@ class Histogram:
     """
 
     def __init__(self, width: float) -> None:
-        self._width = width
+        self._width, self._max = width, 0.0
         self._bins: Counter[int] = Counter()
-        self._count = 0
-        self._max = 0.0
 
     def add(self, value: float) -> None:
         """Count one value."""
         self._bins[int(value / self._width)] += 1
-        self._count += 1
-        if value > self._max:
-            self._max = value
+        self._max = max(self._max, value)
 
     def quantiles(self, name: str) -> dict[str, float]:
         """`<name>.median`, `<name>.p99` (lower edges of their bins) and `<name>.max`.
 
         Nothing if nothing has been counted.
         """
-        if not self._count:
+        if not self._bins:
             return {}
-        quantiles: dict[str, float] = {}
-        seen, bins = 0, sorted(self._bins)
-        left = dict(QUANTILES)
-        for place in bins:
-            seen += self._bins[place]
-            for key in [key for key, share in left.items() if seen >= share * self._count]:
-                del left[key]
-                quantiles[f"{name}.{key}"] = place * self._width
+        quantiles, seen, total = dict[str, float](), 0, self._bins.total()
+        for place in sorted(self._bins):
+            before, seen = seen, seen + self._bins[place]
+            for key, share in QUANTILES.items():
+                if before < share * total <= seen:
+                    quantiles[f"{name}.{key}"] = place * self._width
         return {**quantiles, f"{name}.max": self._max}

@@ -3,17 +3,11 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
-
-_PROC: Final = Path("/proc")
-# Fields of /proc/PID/stat behind the name, which is in brackets: see proc_pid_stat(5).
-_UTIME, _STIME, _START, _RSS = 11, 12, 19, 21
+from typing import NamedTuple
 
 
-@dataclass(frozen=True, slots=True)
-class ProcessUse:
+class ProcessUse(NamedTuple):
     """What a process has taken so far.
 
     Attributes:
@@ -31,10 +25,10 @@ class ProcessUse:
 def read_use(pid: int) -> ProcessUse | None:
     """What a process of this machine has taken; None if there is none of this number."""
     try:
-        text = (_PROC / str(pid) / "stat").read_text(encoding="ascii", errors="replace")
-        fields = text.rpartition(")")[2].split()
-        ticks = int(fields[_UTIME]) + int(fields[_STIME])
-        memory = int(fields[_RSS]) * os.sysconf("SC_PAGE_SIZE")
-        return ProcessUse(int(fields[_START]), ticks / os.sysconf("SC_CLK_TCK"), memory)
-    except (OSError, ValueError, IndexError):  # it has ended, or /proc is not there
+        text = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace")
+    except OSError:  # it has ended, or /proc is not there
         return None
+    fields = text.rpartition(")")[2].split()  # behind the name, see proc_pid_stat(5)
+    user, system, started, pages = (int(fields[place]) for place in (11, 12, 19, 21))
+    cpu_s = (user + system) / os.sysconf("SC_CLK_TCK")
+    return ProcessUse(started, cpu_s, pages * os.sysconf("SC_PAGE_SIZE"))

@@ -1,13 +1,13 @@
-"""Who runs first: the processes that a robot's motors wait for go before ordinary ones."""
+"""Who runs first, and when garbage is collected: a tick has a millisecond."""
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from threading import Event
 from typing import Final
 
 from quadriga.shared.errors import ConfigError
@@ -18,18 +18,14 @@ VARIABLE: Final = "QUADRIGA_PRIORITY"  # of the environment: what holds instead 
 _PRIORITY: Final = 1  # of 99: before every ordinary process, after everything else of the system
 _FIRST: Final = 2  # likewise, before those that walk
 _NICE: Final = -15  # of -20 to 19: an ordinary process gets a thirtieth beside it
-_AUTOGROUP: Final = Path("/proc/self/autogroup")  # "/autogroup-7 nice 0", see sched(7)
-_left: Final = Event()  # set once this process has left its priority by itself
 
 
 def take_priority(priority: str) -> bool:
     """Schedule all threads of this process round robin in real time, if `priority` is `REALTIME`.
 
-    So a thread that wakes up does not push out one at work, which costs both their caches, and
-    no other program delays a command. The system keeps a share (5 % on Linux) for ordinary
+    So no other program delays a command; the system keeps a share (5 % on Linux) for ordinary
     processes. In real time the recorder stays one of them, see `precede_ordinary`, until it
-    starves; in lock-step, where agents and world wait for nothing but each other, it would at once,
-    and is scheduled like them.
+    starves; in lock-step it would at once, and is scheduled like the others.
 
     Args:
         priority: `runtime.priority`, unless the environment has `VARIABLE`.
@@ -41,9 +37,8 @@ def take_priority(priority: str) -> bool:
     Raises:
         ConfigError: the environment's priority is none.
     """
-    if not _is_realtime(priority):
+    if valid_priority(priority) != REALTIME:
         return False
-    _left.clear()
     try:
         _schedule(os.SCHED_RR, _PRIORITY)
     except OSError as error:
@@ -65,25 +60,10 @@ def precede_ordinary(priority: str) -> None:
     Args:
         priority: as of `take_priority`; only `REALTIME` has an effect.
     """
-    if _is_realtime(priority):
+    if valid_priority(priority) == REALTIME:
         for thread in _threads():
             with suppress(OSError):
                 os.setpriority(os.PRIO_PROCESS, thread, _NICE)
-        _weigh_session()
-
-
-def _weigh_session() -> None:
-    """Have this process's niceness hold against processes of other sessions, too.
-
-    Where Linux groups processes by session (`kernel.sched_autogroup_enabled`, for who is in no
-    control group of its own), each session gets the same share of the processors, and a process's
-    niceness counts within its session alone. Here it becomes that of the session, if this process
-    leads it: others in there are not its own.
-    """
-    with suppress(OSError):
-        if os.getsid(0) == os.getpid():
-            niceness = os.getpriority(os.PRIO_PROCESS, 0)
-            _AUTOGROUP.write_text(str(niceness), encoding="ascii")
 
 
 def leave_priority() -> None:
@@ -91,8 +71,6 @@ def leave_priority() -> None:
 
     What it still does, to leave, must not hold up others, such as bridges that lay a robot down.
     """
-    if has_priority():
-        _left.set()
     with suppress(OSError):
         _schedule(os.SCHED_OTHER, 0)
 
@@ -112,9 +90,7 @@ def at_work(priority: str) -> Iterator[None]:
 
 
 def has_priority() -> bool:
-    """Whether this process is scheduled in real time, or was until it left its priority."""
-    if _left.is_set():
-        return True
+    """Whether this process is scheduled in real time."""
     return os.sched_getscheduler(os.getpid()) in (os.SCHED_RR, os.SCHED_FIFO)
 
 
@@ -141,10 +117,6 @@ def valid_priority(priority: str) -> str:
     return found
 
 
-def _is_realtime(priority: str) -> bool:
-    return valid_priority(priority) == REALTIME
-
-
 def _schedule(policy: int, level: int) -> None:
     for thread in _threads():
         with suppress(ProcessLookupError):  # it has ended meanwhile
@@ -158,3 +130,20 @@ def _threads() -> list[int]:
 def count_cores() -> int:
     """Cores that this process may use."""
     return len(os.sched_getaffinity(0))
+
+
+def end_collection() -> None:
+    """No garbage collection from now on, which costs more than a tick; what there is now stays."""
+    gc.freeze()
+    gc.disable()
+
+
+@contextmanager
+def collector_off() -> Iterator[None]:
+    """No garbage collection within the block."""
+    gc.collect()
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()

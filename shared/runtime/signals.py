@@ -9,7 +9,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Final
 
@@ -40,13 +40,20 @@ class StopFlag:
 def stop_on_signals() -> StopFlag:
     """A flag that SIGINT and SIGTERM set from now on, instead of ending the process at once."""
     flag = StopFlag()
-
-    def handle(_number: int, _frame: FrameType | None) -> None:
-        flag.set()
-
     for number in _STOPS:
-        signal.signal(number, handle)
+        signal.signal(number, lambda _number, _frame: flag.set())
     return flag
+
+
+@contextmanager
+def _handled(handle: Callable[[int, FrameType | None], object]) -> Iterator[None]:
+    """Within the block `handle` is called with SIGINT and SIGTERM, which reach the main thread."""
+    before = {number: signal.signal(number, handle) for number in _STOPS}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _is_main_thread() -> bool:
@@ -55,19 +62,13 @@ def _is_main_thread() -> bool:
 
 @contextmanager
 def stop_flag() -> Iterator[StopFlag]:
-    """`stop_on_signals` for the time of a `with` block.
-
-    Signals reach the main thread alone: the flag of another one is never set.
-    """
+    """A flag that SIGINT and SIGTERM set within the block; never that of another thread."""
+    flag = StopFlag()
     if not _is_main_thread():
-        yield StopFlag()
+        yield flag
         return
-    before = {number: signal.getsignal(number) for number in _STOPS}
-    try:
-        yield stop_on_signals()
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+    with _handled(lambda _number, _frame: flag.set()):
+        yield flag
 
 
 @contextmanager
@@ -87,14 +88,10 @@ def interruptible(stopped: Callable[[], bool]) -> Iterator[None]:
     if not isinstance(stopped, StopFlag):
         yield
         return
-    before = {number: signal.signal(number, _interrupt) for number in _STOPS}
-    try:
+    with _handled(_interrupt):
         if stopped():
             raise KeyboardInterrupt
         yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def interrupt_on_sigterm() -> None:
@@ -118,17 +115,6 @@ def interrupt_on_sigterm() -> None:
     for number in _STOPS:  # SIGINT too: a script's background job is started with it ignored
         signal.signal(number, _interrupt)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, _STOPS)
-
-
-def take_due_interrupt() -> bool:
-    """Whether an interrupt that came at a bad moment was still to be tried again; now it is not.
-
-    A library that loses one while it calls back may fail at once for want of what that should
-    have done, before the interrupt is tried again: its error is none.
-    """
-    due = signal.getitimer(signal.ITIMER_REAL)[0] > 0.0
-    signal.setitimer(signal.ITIMER_REAL, 0.0)
-    return due
 
 
 def _interrupt(_number: int, frame: FrameType | None) -> None:
@@ -162,23 +148,18 @@ def kill_if_orphaned(parent: int, patience: float = _PATIENCE) -> None:
         parent: the process that started this one, as it said.
         patience: how long this process may outlive it, s.
     """
-    threading.Thread(target=_outlive, args=(parent, patience), daemon=True).start()
 
+    def outlive() -> None:
+        with suppress(ProcessLookupError):  # it is gone already
+            ended = os.pidfd_open(parent)
+            if os.getppid() == parent:
+                select.select([ended], [], [])  # without a wake-up
+        sleep(patience)
+        said = f"killed {patience:g} s after process {parent}, which had started this one"
+        print(f"quadriga: {said}", file=sys.stderr, flush=True)
+        os.kill(os.getpid(), signal.SIGKILL)
 
-def _outlive(parent: int, patience: float) -> None:
-    """Wait without a wake-up until the parent is gone; some time later kill this process."""
-    try:
-        ended = os.pidfd_open(parent)
-    except ProcessLookupError:
-        ended = -1  # gone already
-    except OSError:
-        return  # a system that cannot tell: SIGTERM must do
-    if ended >= 0 and os.getppid() == parent:
-        select.select([ended], [], [])
-    sleep(patience)
-    said = f"quadriga: killed {patience:g} s after process {parent}, which had started this one\n"
-    print(said, end="", file=sys.stderr, flush=True)
-    os.kill(os.getpid(), signal.SIGKILL)
+    threading.Thread(target=outlive, daemon=True).start()
 
 
 @contextmanager
@@ -195,16 +176,13 @@ def interrupts_held() -> Iterator[None]:
         yield
         return
     noted: list[int] = []
-    handlers = {
-        number: signal.signal(number, lambda received, _frame: noted.append(received))
-        for number in _STOPS
-    }
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
-        yield
+        with _handled(lambda received, _frame: noted.append(received)):
+            before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+            try:
+                yield
+            finally:
+                signal.pthread_sigmask(signal.SIG_SETMASK, before)
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        for number, handler in handlers.items():
-            signal.signal(number, handler)
         if noted:
             signal.raise_signal(noted[0])

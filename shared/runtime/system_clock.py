@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import sys
-from functools import cache
-from typing import Any, Final
+from typing import Final
 
 # Some daemons (phc2sys of linuxptp, systemd-timesyncd) tell the kernel of no error at all.
 LEAST_ERROR_NS: Final = 100_000
@@ -16,9 +15,8 @@ class _Timex(ctypes.Structure):
     """`struct timex` of <sys/timex.h>, on 64 bits."""
 
     _fields_ = (
-        ("modes", ctypes.c_uint),
-        ("offset", ctypes.c_long),
-        ("freq", ctypes.c_long),
+        ("modes", ctypes.c_uint),  # 0: nothing is changed
+        ("offset_and_freq", ctypes.c_long * 2),
         ("maxerror", ctypes.c_long),  # µs
         ("esterror", ctypes.c_long),
         ("status", ctypes.c_int),
@@ -32,14 +30,11 @@ def system_clock_error_ns() -> int:
     It is never said to be better than `LEAST_ERROR_NS`. The kernel lets the error grow by 500 ppm
     from one correction to the next.
     """
-    if sys.platform != "linux":
-        return 0
-    found = _Timex()  # modes 0: nothing is changed
-    if _libc().adjtimex(ctypes.byref(found)) < 0 or found.status & _UNSYNCHRONISED:
+    found = _Timex()
+    if sys.platform != "linux" or _adjtimex(found) < 0 or found.status & _UNSYNCHRONISED:
         return 0
     return max(1000 * int(found.maxerror), LEAST_ERROR_NS)
 
 
-@cache
-def _libc() -> Any:
-    return ctypes.CDLL(None)
+def _adjtimex(found: _Timex) -> int:
+    return int(ctypes.CDLL(None).adjtimex(ctypes.byref(found)))

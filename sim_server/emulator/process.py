@@ -32,8 +32,7 @@ from quadriga.shared.messages import Command, Truth
 from quadriga.shared.printable import printable_line
 from quadriga.shared.robots.conventions import GRAVITY, JOINT_NAMES, Array
 from quadriga.shared.runtime.clock import Rate
-from quadriga.shared.runtime.collector import end_collection
-from quadriga.shared.runtime.scheduling import take_priority
+from quadriga.shared.runtime.scheduling import end_collection, take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
 from quadriga.shared.unitree.packets import parse_buttons, remote_bytes
 from quadriga.sim_server.emulator.robot_emulator import RobotEmulator, open_emulators

@@ -15,7 +15,7 @@ import pytest
 
 from quadriga.commands.config_options import read_config
 from quadriga.commands.parser import build_parser
-from quadriga.shared.bus.membership import members
+from quadriga.shared.bus.diagnostics import members
 from quadriga.shared.config.load import load
 
 LAPTOP = Path(__file__).parents[2] / "deploy" / "laptop"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import socket
-from collections.abc import Callable
 from itertools import cycle
 from pathlib import Path
 from typing import Final
@@ -28,11 +27,9 @@ from quadriga.shared.bus.diagnostics import (
     describe_absent,
     diagnose,
 )
-from quadriga.shared.bus.discovery import read_about
-from quadriga.shared.bus.process_info import describe_process
+from quadriga.shared.bus.discovery import describe_process, read_about
 from quadriga.shared.codec import decode, encode, envelope
 from quadriga.shared.config.load import load
-from quadriga.shared.errors import MessageError
 from quadriga.shared.members import SIM, team_members
 from quadriga.shared.messages import LiveFault
 from quadriga.shared.printable import printable_line
@@ -41,10 +38,9 @@ from quadriga.shared.topics import TABLE
 from quadriga.sim_server.world.faults import KINDS as FAULT_KINDS
 from quadriga.sim_server.world.faults import build_components, parse_faults, with_time
 from quadriga.status.gather import StatusFold
-from quadriga.team.running_team import RunningTeam, choose_team, read_running_team, to_json
 from tests.a1 import standing as standing_state
 from tests.fuzz.damage import damage
-from tests.fuzz.target import Texts, change_json, choose, example
+from tests.fuzz.target import change_json, choose, example
 
 _EVERYTHING: Final = Expected((1 << 40, 0), 1 << 40, 1 << 40, True)
 _LOOK_EVERY: Final = 100  # messages
@@ -175,17 +171,3 @@ class OperatorAnswers:
                 with operator:
                     operator.sendall(content)
                 link.await_stop()
-
-
-def running_teams() -> Texts:
-    """Files by which the teams of this machine are found."""
-    team = RunningTeam("team", "tcp/127.0.0.1:7447", "/tmp/a.toml", "", "/tmp", 4711, 12)
-
-    def read(content: bytes) -> None:
-        found = read_running_team(content.decode("utf-8", errors="replace"))
-        if found is None:
-            raise MessageError("team", "something else", "what a team leaves")
-        choose_team([found, team])
-
-    reader: Callable[[bytes], None] = read
-    return Texts([to_json(team).encode()], reader)

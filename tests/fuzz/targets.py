@@ -18,7 +18,6 @@ KINDS: Final[Mapping[str, Callable[[Path], Target]]] = {
     "orders": lambda _: messages.Orders(),
     "drivers": lambda _: messages.Drivers(),
     "operator-answers": messages.OperatorAnswers,
-    "running-teams": lambda _: messages.running_teams(),
     "configurations": configurations.Configurations,
     "experiments": configurations.experiments,
     "tunings": configurations.tunings,

@@ -11,7 +11,7 @@ from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.codec import encode
 from quadriga.shared.config.sections import Config
 from quadriga.shared.recording.reader import ChunkEntry
-from quadriga.shared.runtime.blas import use_one_blas_thread
+from quadriga.shared.runtime.arithmetic import use_one_blas_thread
 from quadriga.shared.topics import COMMAND, MEASUREMENT, PLAN
 
 OUTPUTS = (COMMAND, MEASUREMENT, PLAN)

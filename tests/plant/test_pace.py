@@ -13,10 +13,8 @@ import pytest
 
 from quadriga.plant import pace as module
 from quadriga.plant.pace import TeamPace
-from quadriga.shared.bus.diagnostics import MemberAnswer
-from quadriga.shared.bus.discovery import join
-from quadriga.shared.bus.membership import members
-from quadriga.shared.bus.process_info import ProcessInfo
+from quadriga.shared.bus.diagnostics import MemberAnswer, members
+from quadriga.shared.bus.discovery import ProcessInfo, join
 from quadriga.shared.bus.session import READY, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config

@@ -14,7 +14,6 @@ from quadriga.plant.protocol import Plant
 from quadriga.plant.server import FALL_LINGER_MS, PlantServer
 from quadriga.shared import codes
 from quadriga.shared.bus.session import Bus
-from quadriga.shared.bus.standstill import Standstill
 from quadriga.shared.codec import MAX_TEXT, decode, encode
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.messages import Clock, Command, Event, State
@@ -29,7 +28,6 @@ class Listener:
     def __init__(self) -> None:
         self.packets: list[tuple[str, bool, bytes]] = []
         self.arrived: list[tuple[str, bytes]] = []
-        self.standstill = Standstill()
 
     def publisher(
         self, key: str, *, droppable: bool = False, urgent: bool = False

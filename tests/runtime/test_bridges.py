@@ -143,7 +143,7 @@ def test_a_bridge_hears_the_emergency_stop_whatever_its_agent_does(
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as walking:
         said = out / "logs" / "plant_r1.log"
         wait_until(lambda: said.is_file() and "r1: walking" in said.read_text(encoding="utf-8"))
-        agent = process_of(out / "config.toml", "agent")
+        agent = process_of(out, "r1")
         with Bus.open(config.bus, config.team.name, members.ESTOP) as bus:
             put = bus.publisher(ESTOP.key(config.team.name))
             wait_until(lambda: "r1" in bus.members_at(HERE))
@@ -164,15 +164,12 @@ def test_a_robot_that_is_off_is_one_clear_error(file: Path, tmp_path: Path) -> N
     assert "Traceback" not in done.stderr
 
 
-def process_of(file: Path, *words: str) -> int:
-    """The process whose command line has these words and runs for this configuration, or 0."""
+def process_of(run: Path, name: str) -> int:
+    """The process of a walk whose output is in the log of this name."""
     for folder in Path("/proc").glob("[0-9]*"):
-        try:
-            line = (folder / "cmdline").read_bytes().decode().split("\0")
-        except (OSError, UnicodeDecodeError):
-            continue
-        if all(word in line for word in words) and any(str(file.parent) in part for part in line):
-            return int(folder.name)
+        with suppress(OSError):
+            if os.readlink(folder / "fd" / "1") == str(run / "logs" / f"{name}.log"):
+                return int(folder.name)
     return 0
 
 
@@ -200,7 +197,7 @@ def test_a_bridge_that_dies_or_hangs_leaves_a_robot_that_is_damped_and_then_pass
         said = out / "logs" / "plant_r1.log"
         wait_until(lambda: said.is_file() and "r1: walking" in said.read_text(encoding="utf-8"))
         assert motors_of(log)[-1] == "motors driven"
-        bridge = process_of(out / "config.toml", "bridge", "--armed")
+        bridge = process_of(out, "plant_r1")
         os.kill(bridge, number)
         wait_until(lambda: motors_of(log)[-1] == "motors off")
         assert motors_of(log)[-3:] == ["motors driven", "motors damped", "motors off"]

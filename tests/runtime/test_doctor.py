@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from quadriga.shared.about import ABOUT, About
-from quadriga.shared.bus.process_info import ProcessInfo, describe_process
+from quadriga.shared.bus.discovery import ProcessInfo, describe_process
 from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.codec import decode, encode
 from quadriga.shared.config.load import load
@@ -29,7 +29,7 @@ from tests.runtime.conftest import BEGUN, WAIT, Make, Team
 
 WAITS = """
 import sys
-from quadriga.shared.bus.discovery import join
+from quadriga.shared.bus.discovery import (join)
 from quadriga.shared.bus.session import Bus
 from quadriga.shared.config.load import parse_assignment, load
 config = load(None, dict(map(parse_assignment, sys.argv[1:])))

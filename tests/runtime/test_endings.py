@@ -70,7 +70,7 @@ def test_kill_9_of_who_drives_time(
 def test_kill_9_of_the_router(
     make_team: Make, watcher: Watcher, capsys: pytest.CaptureFixture[str], mode: str
 ) -> None:
-    keys = {"bus__mode": "client", "world__mode": mode, "bus__reconnect_timeout": 1.0}
+    keys = {"bus__mode": "client", "world__mode": mode}
     team = make_team(recorder__enabled=True, world__duration=600.0, **keys)
     with router(team) as process:
         await_routing(process)

@@ -27,16 +27,19 @@ pytestmark = pytest.mark.usefixtures("_compiled")
 
 
 def processes_of(out: Path) -> dict[int, str]:
-    """Command lines of all processes that work for the run folder `out`, by process id."""
+    """Names of all processes that work for the run folder `out`, by process id."""
     found = {}
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit():
             try:
+                log = Path(os.readlink(entry / "fd" / "1"))
                 words = (entry / "cmdline").read_bytes().decode(errors="replace").split("\0")
             except OSError:
                 continue
-            if any(word.startswith(str(out)) for word in words):
-                found[int(entry.name)] = " ".join(words)
+            if out in log.parents:
+                found[int(entry.name)] = log.stem
+            elif any(word.startswith(str(out)) for word in words):
+                found[int(entry.name)] = "launcher"
     return found
 
 
@@ -111,7 +114,7 @@ def test_a_fall_is_status_1_even_without_a_recording(start: Start) -> None:
 def test_a_killed_agent_is_named_and_status_1(out: Path, start: Start) -> None:
     walk = start("--seconds", "600")
     await_walking(out)
-    agent = next(pid for pid, words in processes_of(out).items() if "--robot r2" in words)
+    agent = next(pid for pid, name in processes_of(out).items() if name == "r2")
     os.kill(agent, signal.SIGKILL)
     _, errors = walk.communicate(timeout=WAIT)
     assert walk.returncode == 1

@@ -10,7 +10,7 @@ import pytest
 
 from quadriga.commands.parser import main
 from quadriga.doctor import watch_team
-from quadriga.shared.bus.process_info import ProcessInfo
+from quadriga.shared.bus.discovery import ProcessInfo
 from quadriga.shared.bus.session import HERE, READY, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.runtime.clock import monotonic, sleep

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from quadriga.shared.about import ABOUT, About, scheduling_of, stage_of
-from quadriga.shared.bus.process_info import describe_process
+from quadriga.shared.bus.discovery import describe_process
 from quadriga.shared.codec import decode, encode
 from quadriga.shared.config.load import load
 

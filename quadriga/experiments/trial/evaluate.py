@@ -16,7 +16,7 @@ from quadriga.experiments.trial.in_process import build_timed_agents, roll_out
 from quadriga.identification.central_planner import build_central_planner, collected_of
 from quadriga.shared.config.sections import Config, WorldConfig
 from quadriga.shared.planner_kinds import find_kind
-from quadriga.shared.runtime.blas import use_one_blas_thread
+from quadriga.shared.runtime.arithmetic import use_one_blas_thread
 
 
 def evaluate(config: Config, predictor: Path | None, data: Path | None = None) -> Figures:

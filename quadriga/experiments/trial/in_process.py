@@ -23,7 +23,7 @@ from quadriga.shared.messages import Event, Measurement, Status, Truth
 from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic_ns
-from quadriga.shared.runtime.collector import collector_off
+from quadriga.shared.runtime.scheduling import collector_off
 from quadriga.shared.topics import REFERENCE_EPOCH_MS, SAMPLE_MS
 from quadriga.sim_server.world.layout import NV
 from quadriga.sim_server.world.world import World

@@ -22,8 +22,7 @@ from quadriga.faults.network.order import RadioOrder
 from quadriga.faults.network.radio import Arrivals, Radio
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.runtime.clock import monotonic
-from quadriga.shared.runtime.collector import end_collection
-from quadriga.shared.runtime.scheduling import take_priority
+from quadriga.shared.runtime.scheduling import end_collection, take_priority
 from quadriga.shared.runtime.signals import StopFlag, die_with_parent, stop_on_signals
 
 _MTU: Final = 1500  # bytes, as of WLAN and Ethernet

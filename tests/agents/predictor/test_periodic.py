@@ -28,7 +28,7 @@ from quadriga.agents.time_grid import gait_phase
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robots.conventions import Array
-from quadriga.shared.runtime.blas import use_one_blas_thread
+from quadriga.shared.runtime.arithmetic import use_one_blas_thread
 
 N, T_INI = 8, 4
 CONFIG = replace(Config(), planner=replace(Config().planner, N=N, T_ini=T_INI))

@@ -15,7 +15,7 @@ from quadriga.agents.predictor.store import predictor_sha256
 from quadriga.shared.config.sections import Config, TeamConfig
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robots.registry import ROBOTS
-from quadriga.shared.runtime.blas import use_one_blas_thread
+from quadriga.shared.runtime.arithmetic import use_one_blas_thread
 from tests.agents.conftest import fit_ridge
 from tests.agents.predictor.plants import Sizes, first_window, random_plant, record
 

@@ -16,7 +16,6 @@ from quadriga.recordings.summary import summarise
 from quadriga.shared import codes
 from quadriga.shared import messages as msg
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.runtime.blas import blas_threads_kept
 from tests.golden import scenario
 from tests.quadriga.conftest import ESTIMATOR_ERROR, SPEED, WriteRun, run_config
 
@@ -112,6 +111,6 @@ def test_a_walk_without_a_predictor_has_none(write_run: WriteRun) -> None:
 def test_a_replay_leaves_the_callers_threads_alone() -> None:
     with threadpool_limits(limits=2):
         before = [library["num_threads"] for library in threadpool_info()]
-        with blas_threads_kept(), threadpool_limits(limits=1):
+        with threadpool_limits(), threadpool_limits(limits=1):
             assert all(library["num_threads"] == 1 for library in threadpool_info())
         assert [library["num_threads"] for library in threadpool_info()] == before

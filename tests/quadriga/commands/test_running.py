@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
@@ -20,8 +22,7 @@ from quadriga.shared.messages import Clock
 from quadriga.shared.runtime.process_use import read_use
 from quadriga.shared.topics import CLOCK
 from quadriga.team.endpoint import free_endpoint
-from quadriga.team.registry import team_registered
-from quadriga.team.running_team import RunningTeam, to_json
+from quadriga.team.registry import RunningTeam, team_registered
 from tests.listening import WAIT, await_listener
 
 TEAM = load(None, {"team.name": "lab", "team.robots": 2, "bus.endpoint": "tcp/127.3.4.2:7447"})
@@ -43,8 +44,7 @@ def add_other(folder: Path, name: str) -> None:
     use = read_use(os.getpid())
     assert use is not None
     other = RunningTeam(name, "tcp/x:1", "/x/config.toml", "/x", "/", os.getpid(), use.started)
-    (folder / "1.json").write_text(to_json(other))
-    (folder / "1.json").chmod(0o600)
+    (folder / "1.json").write_text(json.dumps(asdict(other)))
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from quadriga.doctor.report import DoctorReport, MemberReport, format_report, to
 from quadriga.shared.about import REFUSED as NOT_GRANTED
 from quadriga.shared.bus import diagnostics
 from quadriga.shared.bus.diagnostics import BAD, GOOD, NOTE, UNKNOWN, Diagnosis
-from quadriga.shared.members import OPERATOR, RECORDER, ROUTER, SIM
+from quadriga.shared.members import OPERATOR, PLANNER, RECORDER, ROUTER, SIM
 from quadriga.shared.runtime.places import SOURCE
 from tests.shared.bus.abouts import about, answer
 
@@ -68,7 +68,7 @@ def test_every_code_is_documented() -> None:
         for name, value in vars(module).items()
         if name.isupper() and isinstance(value, str) and re.fullmatch(r"[a-z][a-z-]*[a-z]", value)
     }
-    words = {GOOD, NOTE, BAD, UNKNOWN, SIM, OPERATOR, RECORDER, ROUTER, NOT_GRANTED}
+    words = {GOOD, NOTE, BAD, UNKNOWN, SIM, OPERATOR, RECORDER, ROUTER, PLANNER, NOT_GRANTED}
     codes = {*values, LINK} - words
     assert {"not-started", "warming-up", "governor", "packages", "link"} <= codes
     assert {code for code in codes if f"`{code}`" not in DOC} == set()

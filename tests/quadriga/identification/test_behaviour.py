@@ -135,5 +135,5 @@ def test_other_sources_and_other_arithmetic_ask_for_new_samples(
 
 
 def test_a_module_that_is_not_there_is_an_error(cache: Path) -> None:
-    with pytest.raises(QuadrigaError, match=r"module quadriga\.gone"):
+    with pytest.raises(QuadrigaError, match=r"no file of quadriga\.gone"):
         behaviour("quadriga.gone")

@@ -96,7 +96,7 @@ def ended(recorder: subprocess.Popen[str], world: Bus, to: Path, count: int) -> 
     Nobody announces the end, which is the last that is said.
     """
     await_recorded(to, count)
-    world.withdraw()
+    world.close()
     out, err = recorder.communicate(timeout=WAIT)
     assert recorder.returncode == 1, err
     *said, last = err.splitlines(keepends=True)

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from quadriga.commands.parser import main
-from quadriga.shared.bus.membership import processes
-from quadriga.shared.bus.process_info import ProcessInfo
+from quadriga.shared.bus.diagnostics import processes
+from quadriga.shared.bus.discovery import ProcessInfo
 from quadriga.shared.bus.session import HERE, READY, Bus
 from quadriga.shared.codec import encode
 from quadriga.shared.codes import PUSH

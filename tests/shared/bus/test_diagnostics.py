@@ -72,11 +72,8 @@ def test_silence_has_a_reason(seen: TeamView, code: str, words: str) -> None:
 
 
 def test_who_is_not_started_is_told_with_the_command_that_starts_it() -> None:
-    (item,) = diagnose(R2, view(SIM, about("r1", sees=("sim",)), here=frozenset({"sim", "r1"})))
-    assert item.code == "not-reachable"
     alone = view(about("r1", sees=()), here=frozenset({"r1"}))
     assert "`quadriga agent --robot r2`" in diagnose(R2, alone)[0].remedy
-    assert "`quadriga sim`" in diagnose(MEMBERS["sim"], alone)[0].remedy
 
 
 @pytest.mark.parametrize(
@@ -166,10 +163,7 @@ def test_two_of_a_name_are_told_with_their_places() -> None:
     assert first.text == "two processes of this name, lab:7 and laptop:9"
     assert [item.code for item in rest] == ["ready"]
     assert codes(R2, view(SIM, about("r1"), doubled=frozenset({"r2"})))[0][0] == "two-of-a-name"
-
-
-def test_a_recorder_beside_another_is_no_second_one() -> None:
-    late = about("r2", stage="started", pid=9)
+    late = about("r2", stage="started", pid=9)  # a recorder beside another
     assert codes(R2, view(*EVERYBODY, late)) == [("ready", GOOD)]
 
 
@@ -201,18 +195,6 @@ def test_who_agrees_has_no_disagreement() -> None:
     assert differences() == []
     assert differences(predictor="ab" * 32) == []
     assert differences(host="laptop", pid=9, stage="here", scheduling="realtime", sees=()) == []
-
-
-def test_each_key_that_differs_is_named_with_both_values() -> None:
-    config = ('team.name="team"', "world.seed=4", 'world.mode="realtime"')
-    assert differences(config=config) == [
-        (
-            "configuration",
-            'world.mode "realtime", world.seed 4',
-            'world.mode "lockstep", world.seed 5',
-            "sim",
-        )
-    ]
 
 
 def test_a_key_that_only_one_has_is_named_and_many_are_counted() -> None:
@@ -248,20 +230,11 @@ def test_other_code_or_libraries_are_no_reason_to_refuse() -> None:
     refuse("r2", "team", said)
 
 
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        (
-            {"config": (*SIM.config[:1], "world.seed=4", SIM.config[2])},
-            "configuration of r2 in team 'team': got world.seed 4, "
-            "expected world.seed 5 as sim has it (all processes",
-        ),
-        ({"version": "9"}, "version of r2 in team 'team': got 9, expected 0.1.0 as sim has it"),
-        ({"predictor": "cd" * 32}, "predictor of r2 in team 'team': got cdcdcdcdcdcd, expected ab"),
-    ],
-)
-def test_a_refusal_names_what_differs(changes: dict[str, Any], message: str) -> None:
+def test_a_refusal_names_what_differs() -> None:
+    config = (*SIM.config[:1], "world.seed=4", SIM.config[2])
     with pytest.raises(BusError) as caught:
-        refuse("r2", "team", disagreements(about("r2", code="other", **changes), NORM))
-    assert str(caught.value).startswith(message)
-    assert "\n" not in str(caught.value)
+        refuse("r2", "team", disagreements(about("r2", code="other", config=config), NORM))
+    assert str(caught.value).startswith(
+        "configuration of r2 in team 'team': got world.seed 4, "
+        "expected world.seed 5 as sim has it (all processes"
+    )

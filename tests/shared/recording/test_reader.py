@@ -11,13 +11,13 @@ from mcap.reader import make_reader
 from mcap.records import Channel, Chunk, DataEnd, Footer
 from mcap.stream_reader import StreamReader, breakup_chunk
 
-from quadriga.shared.codec import decode, encode
+from quadriga.shared.codec import encode
 from quadriga.shared.errors import RecordingError
 from quadriga.shared.messages import Command, Reference, State
 from quadriga.shared.recording.metadata import PROFILE, seal
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.recording.writer import McapFile, RecordingWriter
-from quadriga.shared.topics import COMMAND, TABLE
+from quadriga.shared.topics import TABLE
 
 METADATA = {"team": "team", "config_sha256": "ab" * 32}
 
@@ -148,7 +148,7 @@ def test_a_flushed_part_survives_a_kill(tmp_path: Path) -> None:
     assert len(list(Recording(path).entries())) == 40
 
 
-@pytest.mark.parametrize("share", [0.1, 0.37, 0.5, 0.81, 0.97])
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.97])
 def test_a_cut_file_is_read_up_to_the_cut(tmp_path: Path, share: float) -> None:
     sent = write(tmp_path / "run.mcap", 300)
     whole = (tmp_path / "run.mcap").read_bytes()
@@ -160,19 +160,6 @@ def test_a_cut_file_is_read_up_to_the_cut(tmp_path: Path, share: float) -> None:
     assert len(entries) >= int(share * len(sent)) - 100  # at most a few chunks short
     assert not recording.complete
     assert recording.metadata == METADATA
-
-
-def test_a_corrupt_chunk_ends_the_reading(tmp_path: Path) -> None:
-    sent = write(tmp_path / "run.mcap", 300)
-    whole = bytearray((tmp_path / "run.mcap").read_bytes())
-    middle = len(whole) // 2
-    whole[middle : middle + 8] = b"\xa5" * 8
-    (tmp_path / "run.mcap").write_bytes(whole)
-    recording = Recording(tmp_path / "run.mcap")
-    entries = [(e.key, e.payload) for e in recording.entries()]
-    assert 0 < len(entries) < len(sent)
-    assert entries == sent[: len(entries)]
-    assert recording.cut
 
 
 def test_errors_name_the_file(tmp_path: Path) -> None:
@@ -187,16 +174,6 @@ def test_errors_name_the_file(tmp_path: Path) -> None:
         RecordingWriter(empty, METADATA)
     with pytest.raises(RecordingError, match="writable folder"):
         RecordingWriter(Path("/proc/no/folder/run.mcap"), METADATA)
-
-
-def test_an_mcap_file_of_others_is_refused(tmp_path: Path) -> None:
-    sent = write(tmp_path / "run.mcap", 2)
-    content = (tmp_path / "run.mcap").read_bytes().replace(b"quadriga", b"somebody")
-    (tmp_path / "foreign.mcap").write_bytes(content)
-    with pytest.raises(RecordingError, match="no metadata of this project"):
-        Recording(tmp_path / "foreign.mcap")
-    assert decode(sent[1][1], Command).tick == 0
-    assert COMMAND.key("team", "r1") == sent[1][0]
 
 
 def test_a_chunk_whose_checksum_is_right_but_which_holds_no_records_ends_the_reading(
@@ -214,16 +191,6 @@ def test_a_chunk_whose_checksum_is_right_but_which_holds_no_records_ends_the_rea
     recording = Recording(path)
     assert [entry.tick for entry in recording.entries()] == [3]
     assert "is corrupt" in recording.cut
-
-
-def test_a_log_time_that_no_table_can_hold_is_read_as_the_latest_that_one_can(
-    tmp_path: Path,
-) -> None:
-    with RecordingWriter(tmp_path / "run.mcap", METADATA) as writer:
-        for log_time in (1, (1 << 63) - 1, 1 << 63, (1 << 64) - 1):
-            writer.write("team/estop", b"", log_time)
-    times = [entry.log_time_ns for entry in Recording(tmp_path / "run.mcap").entries()]
-    assert np.array(times, dtype=np.int64).tolist() == [1] + [(1 << 63) - 1] * 3
 
 
 def test_a_file_that_is_deleted_while_it_is_written_is_noticed(tmp_path: Path) -> None:

@@ -64,10 +64,3 @@ def test_a_link_stays_one_what_is_no_file_is_written_to_and_an_error_names_the_p
     with pytest.raises(OSError, match="No such file") as caught:
         write_text(tmp_path / "no" / "file", "new")
     assert caught.value.filename == str(tmp_path / "no" / "file")
-
-
-def test_nothing_written_is_nothing_replaced(tmp_path: Path) -> None:
-    path = tmp_path / "figure.png"
-    with atomic_write(path):
-        pass
-    assert not path.exists()

@@ -5,8 +5,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from pathlib import Path
-from typing import Final
 
 import pytest
 
@@ -49,9 +47,8 @@ def test_all_threads_are_scheduled_in_real_time() -> None:
 
 
 @pytest.mark.skipif(not permitted(), reason="this user may not schedule in real time")
-def test_who_leaves_is_ordinary_again_though_it_had_priority() -> None:
-    # The doctor would complain of whoever it meets on its way out.
-    assert answer("realtime", "leave") == (["True", "True", "False", "True"], "")
+def test_who_leaves_is_ordinary_again() -> None:
+    assert answer("realtime", "leave") == (["True", "False", "False", "True"], "")
 
 
 @pytest.mark.parametrize("priority", ["realtime", "ordinary"])
@@ -72,10 +69,6 @@ def test_a_priority_of_the_environment_that_there_is_not_is_refused(
     assert valid_priority("realtime") == "ordinary"
 
 
-def test_ordinary_is_ordinary() -> None:
-    assert answer("ordinary", "") == (["False", "False", "False", "True"], "")
-
-
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can become a user without the right")
 def test_without_the_right_it_runs_all_the_same() -> None:
     found, message = answer("realtime", "deny")
@@ -92,19 +85,6 @@ precede_ordinary(sys.argv[1])
 print(*{os.getpriority(os.PRIO_PROCESS, int(task)) for task in os.listdir("/proc/self/task")})
 print(os.sched_getscheduler(0) == os.SCHED_OTHER)
 """
-_GROUPED: Final = Path("/proc/self/autogroup")  # where sessions share the processors
-
-
-@pytest.mark.skipif(not _GROUPED.exists(), reason="this system does not group by session")
-@pytest.mark.skipif(not permitted(), reason="this user may not take precedence")
-@pytest.mark.parametrize("leads", [True, False])
-def test_precedence_holds_against_other_sessions_of_who_leads_its_own(leads: bool) -> None:
-    before = _GROUPED.read_text()
-    words = [sys.executable, "-c", f"{_NICE}print(open('{_GROUPED}').read())", "realtime"]
-    done = subprocess.run(
-        words, check=True, capture_output=True, text=True, start_new_session=leads
-    )
-    assert done.stdout.endswith("nice -15\n\n" if leads else f"{before}\n")
 
 
 @pytest.mark.skipif(not permitted(), reason="this user may not take precedence")

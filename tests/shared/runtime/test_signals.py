@@ -29,16 +29,6 @@ input()
 """
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_signals_raise_the_flag_for_a_while(number: signal.Signals) -> None:
-    before = signal.getsignal(number)
-    with stop_flag() as stopped:
-        assert not stopped()
-        os.kill(os.getpid(), number)
-        assert stopped()
-    assert signal.getsignal(number) is before
-
-
 def wait_after(number: signal.Signals) -> None:
     os.kill(os.getpid(), number)
     sleep(60.0)
@@ -46,6 +36,7 @@ def wait_after(number: signal.Signals) -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_stop_ends_at_once_what_looks_at_no_flag(number: signal.Signals) -> None:
+    before = signal.getsignal(number)
     with stop_flag() as stopped:
         with pytest.raises(KeyboardInterrupt), interruptible(stopped):
             wait_after(number)
@@ -54,13 +45,7 @@ def test_a_stop_ends_at_once_what_looks_at_no_flag(number: signal.Signals) -> No
         assert stopped(), "and after it the flag is raised as before"
         with pytest.raises(KeyboardInterrupt), interruptible(stopped):
             pytest.fail("a stop that has come before the block")
-
-
-def test_a_flag_of_another_kind_is_asked_before_the_block() -> None:
-    with interruptible(lambda: False):
-        pass
-    with pytest.raises(KeyboardInterrupt), interruptible(lambda: True):
-        pytest.fail("it was to stop before")
+    assert signal.getsignal(number) is before
 
 
 def alive(pid: int) -> bool:
@@ -174,7 +159,6 @@ def called():
 called()
 ready = True
 """
-FAILS_THEN = CALLS_BACK.replace("ready = True", "raise RuntimeError('what it should have done')")
 PROGRAM = """
 import sys
 folder, how = sys.argv[1:]
@@ -200,13 +184,9 @@ sys.exit(main())
 
 
 @pytest.mark.parametrize(
-    ("library", "how", "gone_on"),
-    [(LIBRARY, "import", "gone on\n"), (CALLS_BACK, "run", "gone on\n"), (FAILS_THEN, "run", "")],
-    ids=["import", "callback", "callback that was needed"],
+    ("library", "how"), [(LIBRARY, "import"), (CALLS_BACK, "run")], ids=["import", "callback"]
 )
-def test_an_interrupt_at_a_bad_moment_is_one_line(
-    tmp_path: Path, library: str, how: str, gone_on: str
-) -> None:
+def test_an_interrupt_at_a_bad_moment_is_one_line(tmp_path: Path, library: str, how: str) -> None:
     """As a library in C does, this one makes an error of its own of it, or Python loses it."""
     (tmp_path / "library.py").write_text(library, encoding="utf-8")
     done = subprocess.run(
@@ -217,4 +197,4 @@ def test_an_interrupt_at_a_bad_moment_is_one_line(
         check=False,
     )
     assert (done.returncode, done.stderr) == (130, "quadriga: interrupted\n")
-    assert done.stdout == gone_on
+    assert done.stdout == "gone on\n"

@@ -28,12 +28,10 @@ def test_the_kernel_s_struct_is_read_where_its_fields_are() -> None:
 def test_the_error_is_none_of_a_clock_that_nobody_keeps_and_never_nothing(
     monkeypatch: pytest.MonkeyPatch, status: int, maxerror: int, error: int
 ) -> None:
-    class Kernel:
-        @staticmethod
-        def adjtimex(timex: object) -> int:
-            timex._obj.status, timex._obj.maxerror = status, maxerror  # type: ignore[attr-defined]
-            return 0
+    def adjtimex(timex: system_clock._Timex) -> int:
+        timex.status, timex.maxerror = status, maxerror
+        return 0
 
-    monkeypatch.setattr(system_clock, "_libc", Kernel)
+    monkeypatch.setattr(system_clock, "_adjtimex", adjtimex)
     monkeypatch.setattr(sys, "platform", "linux")
     assert system_clock_error_ns() == error

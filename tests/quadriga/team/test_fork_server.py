@@ -12,10 +12,9 @@ from pathlib import Path
 import pytest
 
 from quadriga.shared.runtime.clock import monotonic, sleep
-from quadriga.team import forked
+from quadriga.team import fork_server
 from quadriga.team.endpoint import free_endpoint
-from quadriga.team.fork_server import Fork, ForkOrder
-from quadriga.team.forked import ForkedProcess, ForkServer, start_forked
+from quadriga.team.fork_server import Fork, ForkedProcess, ForkServer, start_forked
 from quadriga.team.launch import QUADRIGA, Launch, ProcessSpec
 from quadriga.workers import run_each
 
@@ -24,12 +23,12 @@ WAIT = 20.0  # s
 
 def router(folder: Path, name: str) -> Fork:
     """A process that runs until it is stopped."""
-    words = (*QUADRIGA, "router", "--listen", free_endpoint(), "--parent", str(os.getpid()))
+    words = ("router", "--listen", free_endpoint(), "--parent", str(os.getpid()))
     return Fork(words, str(folder / f"{name}.log"))
 
 
 def start(*forks: Fork) -> list[ForkedProcess]:
-    return start_forked(forks, len(QUADRIGA), dict(os.environ))
+    return start_forked(forks, dict(os.environ))
 
 
 def ready(forks: Sequence[Fork]) -> None:
@@ -61,16 +60,8 @@ def test_each_is_a_child_of_this_process_in_a_session_of_its_own(
         folder = Path("/proc", str(process.pid))
         fields = (folder / "stat").read_text().rpartition(") ")[2].split()
         assert [int(fields[n]) for n in (1, 3)] == [os.getpid(), process.pid]
+        assert (folder / "comm").read_text() == "quadriga router\n"
         assert "routing at tcp/" in Path(fork.log).read_text()
-
-
-def test_each_is_shown_with_the_words_of_its_own(
-    forks: list[Fork], routers: list[ForkedProcess]
-) -> None:
-    ready(forks)
-    for fork, process in zip(forks, routers, strict=True):
-        shown = Path("/proc", str(process.pid), "cmdline").read_bytes().decode()
-        assert tuple(shown.rstrip("\0").split("\0")) == fork.words
 
 
 def test_each_ends_as_it_is_told_to(forks: list[Fork], routers: list[ForkedProcess]) -> None:
@@ -88,7 +79,7 @@ def test_each_ends_as_it_is_told_to(forks: list[Fork], routers: list[ForkedProce
 
 def test_a_wrong_command_has_its_own_status_and_says_why(tmp_path: Path) -> None:
     log = tmp_path / "agent.log"
-    words = (*QUADRIGA, "agent", "--robot", "r7", "--parent", str(os.getpid()))
+    words = ("agent", "--robot", "r7", "--parent", str(os.getpid()))
     (process,) = start(Fork(words, str(log)))
     assert process.wait(WAIT) == 2
     assert "--robot: got 'r7'" in log.read_text()
@@ -103,7 +94,7 @@ def test_no_process_imports_from_the_working_directory(
     alone = subprocess.run([*QUADRIGA, "version"], capture_output=True, check=False)
     assert (alone.returncode, alone.stderr) == (0, b"")
     log = tmp_path / "version.log"
-    (process,) = start(Fork((*QUADRIGA, "version"), str(log)))
+    (process,) = start(Fork(("version",), str(log)))
     assert (process.wait(WAIT), log.read_bytes()) == (0, alone.stdout)
     assert dict(run_each(os.getenv, ["PYTHONSAFEPATH"], 1)) == {"PYTHONSAFEPATH": None}
 
@@ -112,7 +103,7 @@ def test_nobody_begins_whose_start_is_not_known(forks: list[Fork]) -> None:
     """As when who starts them is interrupted between the forks and the word to begin."""
     go, begin = os.pipe()
     server = ForkServer([], os.environ)
-    pids = server.start(ForkOrder(len(QUADRIGA), tuple(forks)), go)
+    pids = server.start(forks, go)
     assert all(Path("/proc", str(pid)).exists() for pid in pids)
     os.close(begin)
     os.close(go)
@@ -124,10 +115,10 @@ def test_nobody_begins_whose_start_is_not_known(forks: list[Fork]) -> None:
 def test_the_next_team_comes_from_the_same_server(
     forks: list[Fork], routers: list[ForkedProcess]
 ) -> None:
-    (server,) = forked._kept
+    (server,) = fork_server._kept
     ready(forks)
     more = start(*forks)
-    assert forked._kept == [server]
+    assert fork_server._kept == [server]
     assert all(process.poll() is None for process in routers)
     for process in more:
         process.kill()
@@ -138,10 +129,10 @@ def test_another_environment_has_a_server_of_its_own(
     forks: list[Fork], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (first,) = start(forks[0])
-    (server,) = forked._kept
+    (server,) = fork_server._kept
     monkeypatch.setenv("OF_ANOTHER_TEAM", "1")
     (second,) = start(forks[1])
-    assert forked._kept != [server]
+    assert fork_server._kept != [server]
     ready(forks)
     assert b"OF_ANOTHER_TEAM=1" in Path(f"/proc/{second.pid}/environ").read_bytes()
     for process in (first, second):
@@ -150,8 +141,8 @@ def test_another_environment_has_a_server_of_its_own(
 
 
 def test_a_server_that_has_been_killed_is_replaced(forks: list[Fork]) -> None:
-    forked.expect_forks(["router"], os.environ)
-    (server,) = forked._kept
+    fork_server.expect_forks(["router"], os.environ)
+    (server,) = fork_server._kept
     server._process.kill()
     server._process.wait()
     (process,) = start(forks[0])
@@ -162,9 +153,9 @@ def test_a_server_that_has_been_killed_is_replaced(forks: list[Fork]) -> None:
 
 def test_a_server_does_not_outlive_whoever_keeps_it() -> None:
     code = (
-        "import os; from quadriga.team import forked;"
-        "forked.expect_forks(['agent'], os.environ);"
-        "print(forked._kept[0]._process.pid, flush=True); os._exit(0)"
+        "import os; from quadriga.team import fork_server;"
+        "fork_server.expect_forks(['agent'], os.environ);"
+        "print(fork_server._kept[0]._process.pid, flush=True); os._exit(0)"
     )
     said = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True, text=True)
     wait_until(lambda: not _runs(int(said.stdout)))
@@ -187,11 +178,10 @@ def _runs(pid: int) -> bool:
 def test_a_team_starts_without_a_fork_server_too(
     forks: list[Fork], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    fails = (sys.executable, "-c", "raise SystemExit(3)")
-    monkeypatch.setattr(forked, "_kept", [])
-    monkeypatch.setattr(forked, "command_line", lambda *_: fails)
+    monkeypatch.setattr(fork_server, "_kept", [])
+    monkeypatch.setattr(fork_server, "__name__", "quadriga.no_module")
     assert start(*forks) == []
-    words = [fork.words[:-2] for fork in forks]
+    words = [(*QUADRIGA, *fork.words[:-2]) for fork in forks]
     rows = [ProcessSpec(name, of, 5.0) for name, of in zip(("one", "two"), words, strict=True)]
     with Launch(rows, tmp_path) as running:
         ready(forks)
@@ -204,7 +194,7 @@ def test_the_others_start_beside_them_in_the_order_of_the_table(
     forks: list[Fork], tmp_path: Path
 ) -> None:
     other = (sys.executable, "-c", "import time; time.sleep(60)")
-    words = (forks[0].words[:-2], other, forks[1].words[:-2])
+    words = ((*QUADRIGA, *forks[0].words[:-2]), other, (*QUADRIGA, *forks[1].words[:-2]))
     names = ("one", "other", "two")
     rows = [ProcessSpec(name, of, 5.0) for name, of in zip(names, words, strict=True)]
     with Launch(rows, tmp_path) as running:
