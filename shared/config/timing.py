@@ -34,26 +34,3 @@ def max_ages(config: Config) -> dict[str, int]:
     steps = 1 + planner.max_peer_age + planner.hold_steps
     ages = {topic.name: topic.max_age_ms for topic in TABLE}
     return ages | {PLAN.name: steps * SAMPLE_MS * planner.applied + late}
-
-
-def max_ages(config: Config) -> dict[str, int]:
-    """Longest gap, and greatest age in use, that is nothing unusual, by topic, ms; 0: none.
-
-    A plan is used until who made it is given up. Those of peers are of the step before; those of
-    a central planner come its latency after their data.
-    """
-    planner = config.planner
-    late = max(1, planner.latency_ms) if find_kind(planner.kind).central else 0
-    steps = 1 + planner.max_peer_age + planner.hold_steps
-    ages = {topic.name: topic.max_age_ms for topic in TABLE}
-    return ages | {PLAN.name: steps * SAMPLE_MS * planner.applied + late}
-
-
-def waits_for_router(config: Config) -> bool:
-    """Whether processes do without a router for `bus.reconnect_timeout` before they leave.
-
-    In lock-step a message that is lost would not be sent again. Where each robot has a plant of its
-    own, none goes on without the others.
-    """
-    realtime, alone = config.world.mode == "realtime", not config.team.plant_per_robot
-    return config.bus.mode == "client" and realtime and alone
