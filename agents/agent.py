@@ -37,11 +37,11 @@ from quadriga.agents.modes import (
     step_mode,
     stop_safely,
 )
-from quadriga.agents.planner.qp_solver import SolvedQp
-from quadriga.agents.planner.team_planner import Collected
+from quadriga.agents.planner.solver import SolvedQp
+from quadriga.agents.planner.team import Collected
 from quadriga.agents.planning.active_plan import setpoint_at
 from quadriga.agents.planning.interface import Expected, PlanningInputs
-from quadriga.agents.planning.operator_references import reference_at, remember_references
+from quadriga.agents.planning.references import reference_at, remember_references
 from quadriga.agents.planning.registry import PlanningState, build_planning
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.rising import Rise, Rising

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from quadriga.agents.planning.operator_references import AHEAD_MS
+from quadriga.agents.planning.references import AHEAD_MS
 
 _NONE: Final = -1
 

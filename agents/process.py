@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from quadriga.agents.agent import Agent
 from quadriga.agents.inbox.inbox import Inbox
-from quadriga.agents.planner.team_planner import Collected
+from quadriga.agents.planner.team import Collected
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.predictor.store import predictor_sha256
 from quadriga.agents.shell import answer_states

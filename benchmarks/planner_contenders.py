@@ -10,18 +10,17 @@ import numpy as np
 
 from benchmarks.as_written import DeepcQp, PaperQp
 from benchmarks.planner_ticks import PlanningTick
-from quadriga.agents.planner.deepc_qp import build_model, select
 from quadriga.agents.planner.peer_terms import PeerTerms
 from quadriga.agents.planner.planner import Planner
-from quadriga.agents.planner.planner_qp import (
+from quadriga.agents.planner.qp import (
     PlannerProblem,
     build_problem,
     constrain,
     stance_columns,
     unpack,
 )
-from quadriga.agents.planner.qp_solver import SOLVERS, Solver
-from quadriga.agents.planner.team_planner import TeamPlanner, build_centralised
+from quadriga.agents.planner.solver import SOLVERS, Solver
+from quadriga.agents.planner.team import TeamPlanner, build_centralised, build_model, select
 from quadriga.agents.predictor.deepc import reduce
 from quadriga.agents.predictor.episode import Episode
 from quadriga.agents.predictor.predictor import Predictor
@@ -137,7 +136,7 @@ class Local:
         def run(case: Case) -> Array:
             (i,), problem = case.robots, case.problem
             solver = self._solvers[name, i, case.tick.stance[i].tobytes()]
-            solution = solver.solve(problem.gradient @ (case.y_free - case.y_des))
+            solution = solver.solve(problem.condensed.F_des @ (case.y_des - case.y_free))
             return unpack(problem, solution.x, case.y_free)[0].ravel()
 
         return run
@@ -202,7 +201,7 @@ class TeamDeepc:
         planner = config.planner
         self._config, self._episodes = config, episodes
         reduction = reduce(episodes, planner.T_ini, planner.N)
-        self._model = build_model(reduction, planner, planner.lambda_g, planner.lambda_sigma)
+        self._model = build_model(reduction, planner)
         self._set_up = cache(self._build)
 
     def cases(self, tick: PlanningTick) -> list[Case]:

@@ -75,9 +75,9 @@ class PlannerKind:
 
 
 # What agents do of every kind that is one process for the team: they follow its plans.
-FOLLOW: Final = "quadriga.agents.planning.remote:build_remote"
+FOLLOW: Final = "quadriga.agents.planning.remote:RemotePlanning"
 _LOCAL: Final = "quadriga.agents.planning.local:LocalPlanning"
-_CENTRAL: Final = "quadriga.agents.planner.team_planner"
+_CENTRAL: Final = "quadriga.agents.planner.team"
 
 NO_PLANNER: Final = "none"  # the kind without plans
 
@@ -95,19 +95,19 @@ BUILT_IN: Final[Mapping[str, PlannerKind]] = {
             "centralised",
             "one process plans for all (eq. 7)",
             FOLLOW,
-            f"{_CENTRAL}:build_centralised_team",
+            f"{_CENTRAL}:build_centralised",
         ),
         PlannerKind(
             "deepc",
             "one process plans for all (eq. 5)",
             FOLLOW,
-            f"{_CENTRAL}:build_deepc_team",
+            f"{_CENTRAL}:build_deepc",
             needs_data=True,
         ),
         PlannerKind(
             NO_PLANNER,
             "nominal forces",
-            "quadriga.agents.planning.nominal:build_nominal",
+            "quadriga.agents.planning.registry:NominalPlanning",
             needs_predictor=False,
             publishes=False,
         ),

@@ -12,8 +12,8 @@ from quadriga.agents import gait, rehearsal
 from quadriga.agents.controller import estimator
 from quadriga.agents.controller.maths import leg_kinematics as kinematics
 from quadriga.agents.controller.memory import FilterState
-from quadriga.agents.planner import planner_qp
-from quadriga.agents.planner.planner_qp import PlannerProblem
+from quadriga.agents.planner import qp
+from quadriga.agents.planner.qp import PlannerProblem
 from quadriga.shared.config.sections import PlannerConfig
 from quadriga.shared.messages import State
 from quadriga.shared.robots import pinocchio_model
@@ -62,5 +62,5 @@ def build_pinocchio_model() -> pin.Model:
 def build_problem(
     config: PlannerConfig, G_u: Array, stance: NDArray[np.bool_], G_past: Array | None = None
 ) -> PlannerProblem:
-    """See `planner_qp.build_problem`."""
-    return planner_qp.build_problem(config, WEIGHT, G_u, stance, G_past)
+    """See `qp.build_problem`."""
+    return qp.build_problem(config, WEIGHT, G_u, stance, G_past)

@@ -16,10 +16,10 @@ from quadriga.agents.planner.cooperation import (
     cooperative_radius,
     cost_of,
     is_cooperative,
+    kept_share,
     team_hessian,
 )
-from quadriga.agents.planner.damping import kept_share
-from quadriga.agents.planner.planner_qp import build_problem
+from quadriga.agents.planner.qp import build_problem
 from quadriga.agents.predictor.episode import Episode
 from quadriga.agents.predictor.gates import (
     GAIN_TIMES,

@@ -8,7 +8,7 @@ determines, with ‖·‖² = aᵀ S_aa⁻¹ a, and one of free coordinates z:
 
 At the optimum g has no part outside the span of the data's rows. g, σ and S belong to scaled
 signals, which of a team are deviations (`Episode.scaled_deviations`).
-`quadriga.agents.planner.deepc_qp` makes the QP of this.
+`quadriga.agents.planner.team` makes the QP of this.
 """
 
 from __future__ import annotations

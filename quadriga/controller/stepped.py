@@ -27,7 +27,7 @@ from quadriga.agents.modes import (
     step_mode,
 )
 from quadriga.agents.planning.interface import NOTHING, Expected
-from quadriga.agents.planning.operator_references import reference_at, remember_references
+from quadriga.agents.planning.references import reference_at, remember_references
 from quadriga.agents.step_io import Inputs, Outputs
 from quadriga.controller.motor_command import CAUSE
 from quadriga.plant.late import damp_joints

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from quadriga.agents.planner.neighbours import PeerData, PeerSelection
 from quadriga.agents.planner.peer_terms import PeerTerms
+from quadriga.agents.planner.peers import PeerData, PeerSelection
 from quadriga.agents.planner.planner import Planner, PlannerInputs, PlanResult
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config
@@ -27,7 +27,7 @@ def peer(config: Config, **changes: Any) -> PeerData:
     quiet = PeerData(
         robot="r2",
         index=1,
-        status="fresh",
+        status="usable",
         step=STEP - 1,
         age=0,
         known=np.ones(config.planner.T_ini, dtype=np.bool_),

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quadriga.agents.announced_end import AnnouncedEnd
-from quadriga.agents.planning.operator_references import AHEAD_MS
+from quadriga.agents.planning.references import AHEAD_MS
 
 
 def test_nothing_is_awaited_before_an_end_is_announced() -> None:

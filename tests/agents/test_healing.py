@@ -267,6 +267,6 @@ def test_a_pair_that_had_lost_each_other_walks_and_plans_on_together() -> None:
     assert {name: o.mode for name, o in begun.items()} == {"r1": "walk", "r2": "walk"}
     later = run(5000)
     assert {o.mode for o in later.values()} == {"walk"}
-    used = {name: state.planning.planner.newest[0] for name, state in rollout.states.items()}
+    used = {name: state.planning.planner.planner.step for name, state in rollout.states.items()}
     assert set(used.values()) == {4960 // 40}
     assert not rollout.world.fallen()

@@ -13,7 +13,7 @@ import pytest
 from rich.console import Console
 
 from quadriga.agents.planner.acceptance import load_checked as load_predictor
-from quadriga.agents.planning.operator_references import AHEAD_MS
+from quadriga.agents.planning.references import AHEAD_MS
 from quadriga.agents.time_grid import first_step, step_ms
 from quadriga.identification.central_planner import build_central_planner
 from quadriga.identification.predictors import ensure_predictor

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from quadriga.agents.agent import Agent
 from quadriga.agents.planner.acceptance import load_checked
-from quadriga.agents.planner.team_planner import TeamPlanner
+from quadriga.agents.planner.team import TeamPlanner
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.experiments.trial.figures_of_merit import Figures, compute_figures
 from quadriga.experiments.trial.in_process import build_timed_agents, roll_out

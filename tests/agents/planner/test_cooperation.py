@@ -22,21 +22,24 @@ from quadriga.agents.planner.acceptance import (
 )
 from quadriga.agents.planner.cooperation import (
     cooperative_radius,
+    coupled_peers,
     eigenvalue_range,
     is_cooperative,
+    kept_by_agent,
+    kept_share,
     new_plan_share,
-    relevant_peers,
     team_hessian,
 )
-from quadriga.agents.planner.neighbours import HELD, LOST, SHIFTED, PeerData, PeerSelection
 from quadriga.agents.planner.peer_terms import PeerTerms
+from quadriga.agents.planner.peers import HELD, LOST, PeerData, PeerSelection
 from quadriga.agents.planner.planner import Planner, PlannerInputs
-from quadriga.agents.planner.team_planner import build_centralised
+from quadriga.agents.planner.team import build_centralised
 from quadriga.agents.predictor.fits import fit_ridge
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.time_grid import horizon_stance, walking_steps
+from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
-from quadriga.shared.errors import PredictorError
+from quadriga.shared.errors import ConfigError, PredictorError
 from quadriga.shared.robots.conventions import Array
 from tests.a1 import WEIGHT, nominal_forces
 from tests.agents.calm import BASE, NOTHING, STEP, Team, inputs_of, peer, terms_of
@@ -234,7 +237,7 @@ def test_the_slope_is_that_of_the_team_s_cost(small: Config, linear_team: Team) 
         assert slope[place] == pytest.approx(rise, rel=1e-4, abs=1e-4 * np.abs(slope).max())
 
 
-def test_news_is_answered_in_full_and_all_else_in_part(small: Config) -> None:
+def test_the_innovation_is_answered_in_full_and_all_else_in_part(small: Config) -> None:
     """One step after a plan: the same window as it predicted, and one that is off it."""
     config = cooperative(small)
     predictor = coupled(config, 4, 0.5)
@@ -258,8 +261,8 @@ def test_news_is_answered_in_full_and_all_else_in_part(small: Config) -> None:
     qp = planner.problem_of(state, expected, terms)
     assert qp is not None
     F_past, H = qp.problem.condensed.F_past, qp.problem.H
-    news = np.concatenate([np.zeros(12 * T_ini), off.ravel()])
-    answer = -np.linalg.solve(H, F_past @ news)
+    innovation = np.concatenate([np.zeros(12 * T_ini), off.ravel()])
+    answer = -np.linalg.solve(H, F_past @ innovation)
     moved = (surprised.du - calm.du).ravel()[qp.problem.columns]
     np.testing.assert_allclose(moved, answer, atol=1e-6)
     assert np.abs(answer).max() > 0.01
@@ -332,13 +335,14 @@ def test_those_matter_who_reach_a_neighbour(small: Config) -> None:
     for i in range(4):
         for j in range(4):
             G[:, i, j] *= abs(i - j) <= 1
-    predictor = Predictor(PredictorMeta.of(config), G)
-    assert [sorted(relevant_peers(predictor, i)) for i in range(4)] == [
-        [1, 2],
-        [0, 2, 3],
-        [0, 1, 3],
-        [1, 2],
-    ]
+    predictor = Predictor(replace(PredictorMeta.of(config), neighbours="yoked"), G)
+
+    def peers(asked: Config) -> list[list[int]]:
+        return [sorted(coupled_peers(asked, i, predictor)) for i in range(4)]
+
+    assert peers(config) == [[1, 2], [0, 2, 3], [0, 1, 3], [1, 2]]
+    assert peers(small_own(config)) == [[1], [0, 2], [1, 3], [2]]
+    assert peers(cooperative(small, robots=4, kind="decentralised")) == [[]] * 4
 
 
 def test_an_older_plan_counts_from_where_it_is_now_and_a_silent_peer_s_effect_is_held(
@@ -373,7 +377,7 @@ def test_an_older_plan_counts_from_where_it_is_now_and_a_silent_peer_s_effect_is
 
     np.testing.assert_allclose(fresh.effect, effect[0], atol=1e-6 * np.abs(effect).max())
     np.testing.assert_allclose(fresh.slope, slope_of(STEP), rtol=1e-4, atol=1e-4)
-    shifted = terms(STEP, NOTHING, peer(config, status=SHIFTED, age=1, du=pushing), third)
+    shifted = terms(STEP, NOTHING, peer(config, age=1, du=pushing), third)
     np.testing.assert_array_equal(shifted.slope, fresh.slope)
     now = fresh
     for step in range(STEP + 1, STEP + 7):
@@ -387,3 +391,43 @@ def test_an_older_plan_counts_from_where_it_is_now_and_a_silent_peer_s_effect_is
     assert result.status == "nominal:peer-lost"
     assert state.solves == 0
     assert inputs_of(config).weight == WEIGHT
+
+
+# ---- damping of best responses
+
+
+def share(robots: int, **planner: object) -> float:
+    keys = {"team.robots": robots, **{f"planner.{k}": v for k, v in planner.items()}}
+    return kept_share(load(overrides=keys))
+
+
+@given(st.integers(3, 10))
+def test_it_is_the_fastest_for_robots_alike_with_half_their_own_effect_on_each_other(
+    n: int,
+) -> None:
+    """The map of n such robots is −c (1 1ᵀ − I); damped, its radius is least at this share."""
+    alike = -0.5 * (np.ones((n, n)) - np.eye(n))
+    eigenvalues = np.linalg.eigvalsh(alike)
+    candidates = np.linspace(0.0, 0.99, 991)
+    radii = [np.abs(d + (1.0 - d) * eigenvalues).max() for d in candidates]
+    best = candidates[int(np.argmin(radii))]
+    assert share(n, preset="fast") == pytest.approx(best, abs=1e-3)
+    assert min(radii) < 1.0
+
+
+def test_few_robots_are_damped_only_if_they_are_asked_to_be() -> None:
+    shares = {(1, "usual"): 0.0, (3, "usual"): 0.0, (4, "usual"): 1 / 3, (2, "fast"): 0.0,
+              (3, "fast"): 0.2, (10, "paper"): 0.0}  # fmt: skip
+    found = {key: share(key[0], preset=key[1]) for key in shares}
+    assert found == pytest.approx(shares)
+    assert (share(10, damping=0.0), share(2, damping=0.3)) == (0.0, 0.3)
+    with pytest.raises(ConfigError, match=r"planner.damping: got -0.5, expected -1, or 0 … 0.95"):
+        share(5, damping=-0.5)
+
+
+def test_who_answers_nobody_is_damped_only_if_it_is_asked_to() -> None:
+    kinds = ("distributed", "decentralised")
+    teams = [load(overrides={"team.robots": 5, "planner.kind": kind}) for kind in kinds]
+    assert [kept_by_agent(team) for team in teams] == [pytest.approx(3 / 7), 0.0]
+    asked = load(overrides={"planner.kind": "decentralised", "planner.damping": 0.4})
+    assert kept_by_agent(asked) == 0.4

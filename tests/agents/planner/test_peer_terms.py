@@ -7,9 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from quadriga.agents.planner.neighbours import HELD, LOST, PeerData, PeerSelection
-from quadriga.agents.planner.peer_terms import PeerTerms
+from quadriga.agents.planner.peer_terms import Coupling, PeerTerms
+from quadriga.agents.planner.peers import HELD, LOST, PeerData, PeerSelection
 from quadriga.agents.planner.planner import Planner
 from quadriga.agents.predictor.fits import fit_ridge
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
@@ -110,3 +112,20 @@ def test_on_the_way_nothing_is_set_up_any_more(
                 terms, PeerSelection((peer(config),), step - steps), step, base
             )
             state, _ = planner.step(state, inputs_of(config, step), terms)
+
+
+@given(seed=st.integers(0, 2**32 - 1), peers=st.integers(0, 4))
+def test_leaving_out_swinging_legs_changes_nothing(seed: int, peers: int) -> None:
+    """A force on one is not believed."""
+    rng, N, past = np.random.default_rng(seed), 4, 18 * 3
+    G = rng.normal(size=(peers, 6 * N, past + 12 * N))
+    stance = [rng.random((N, 4)) < 0.5 for _ in range(peers)]
+    told = rng.normal(size=(peers, past + 12 * N))
+    z = told.copy()
+    for part, pattern in zip(z, stance, strict=True):
+        part[past:] *= np.repeat(pattern, 3, axis=1).ravel()
+    expected = sum((block @ part for block, part in zip(G, z, strict=True)), np.zeros(6 * N))
+    found = Coupling(G, stance).effect(told.ravel().astype(np.float32))
+    scale = np.abs(G).max(initial=1.0) * np.abs(z).max(initial=1.0) * z.size
+    np.testing.assert_allclose(found, expected[: len(found)], atol=1e-6 * scale, rtol=0)
+    assert found.dtype == np.float64

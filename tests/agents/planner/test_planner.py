@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from quadriga.agents.planner.planner import Planner, PlannerState, PlanResult
+from quadriga.agents.planner.qp import unpack
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config
@@ -51,6 +52,39 @@ def test_the_planned_outputs_are_what_the_team_will_do(
     future[:, 0] = 0.0
     otherwise = BASE + team.respond(np.concatenate([past, future]))[40:, 0]
     np.testing.assert_allclose(result.y_nominal, otherwise, atol=1e-6)
+
+
+@pytest.mark.parametrize("size", [0.05, 1.0, 3.0])
+def test_the_qp_is_that_of_eq_12_written_out(
+    small: Config, predictor: Predictor, size: float
+) -> None:
+    """With forces within and at their limits."""
+    rng = np.random.default_rng(9)
+    stance = rng.random((4, 4)) < 0.5
+    inputs = inputs_of(
+        small,
+        u_ini=nominal_forces(stance) + 5.0 * size * rng.normal(size=(4, 12)),
+        stance_ini=stance,
+        y_ini=BASE + 0.05 * size * rng.normal(size=(4, 6)),
+        y_des=BASE + 0.05 * size * rng.normal(size=(8, 6)),
+    )
+    planner = Planner(small, 0, predictor)
+    terms = terms_of(small, planner, peer(small, du=size * rng.normal(size=(8, 12))))
+    solved = planner.problem_of(planner.initial(), inputs, terms)
+    assert solved is not None
+    _, result = planner.step(planner.initial(), inputs, terms)
+    G, past = predictor.block(0, 0), predictor.meta.past
+    y_free = G[:, :past] @ inputs.past() + terms.effect
+    error = y_free - (inputs.y_des - inputs.y_base).ravel()
+    weighted = G[:, past:][:, solved.problem.columns].T * np.tile(small.planner.Q, 8)
+    np.testing.assert_allclose(solved.f, weighted @ error, atol=1e-9)
+    assert (solved.solution.iterations > 0) == (size > 0.1)
+    du, dy = unpack(solved.problem, solved.solution.x, y_free)
+    np.testing.assert_array_equal(result.du, du)
+    np.testing.assert_array_equal(result.u, nominal_forces(horizon_stance(small, 0, STEP)) + du)
+    np.testing.assert_allclose(result.y, inputs.y_base + dy, atol=1e-12)
+    np.testing.assert_allclose(result.y_nominal, inputs.y_base + y_free.reshape(8, 6), atol=1e-12)
+    assert result.residuals == solved.solution.residuals
 
 
 def test_the_plan_brings_the_robot_back(small: Config, predictor: Predictor) -> None:

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from quadriga.agents.planner.deepc_qp import DeepcWeights, eliminate
+from quadriga.agents.planner.team import eliminate
 from quadriga.agents.predictor.control import (
     DataDrivenController,
     DataDrivenPlan,
@@ -188,7 +188,10 @@ def test_the_robots_elimination_has_the_same_plan_for_any_plant(
     square = np.array(layout.y_scale) ** 2
     model = eliminate(
         reduce_signals(case.data.scaled(layout), layout),
-        DeepcWeights(np.full(sizes.outputs, 2.0), np.full(sizes.inputs, 0.3), 5.0, 100.0 * square),
+        np.full(sizes.outputs, 2.0),
+        np.full(sizes.inputs, 0.3),
+        5.0,
+        100.0 * square,
     )
     past = np.concatenate(
         [

@@ -12,7 +12,7 @@ from scipy import optimize
 
 from quadriga.agents.planner.peer_terms import PeerTerms
 from quadriga.agents.planner.planner import Planner, PlannerInputs
-from quadriga.agents.planner.team_planner import build_centralised
+from quadriga.agents.planner.team import build_centralised
 from quadriga.agents.predictor.fits import fit_ridge
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.time_grid import horizon_stance
