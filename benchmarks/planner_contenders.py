@@ -10,7 +10,6 @@ import numpy as np
 
 from benchmarks.as_written import DeepcQp, PaperQp
 from benchmarks.planner_ticks import PlanningTick
-from quadriga.agents.planner.peer_terms import PeerTerms
 from quadriga.agents.planner.planner import Planner
 from quadriga.agents.planner.qp import (
     PlannerProblem,
@@ -19,7 +18,7 @@ from quadriga.agents.planner.qp import (
     stance_columns,
     unpack,
 )
-from quadriga.agents.planner.solver import SOLVERS, Solver
+from quadriga.agents.planner.solver import SOLVERS, DaqpSolver
 from quadriga.agents.planner.team import TeamPlanner, build_centralised, build_model, select
 from quadriga.agents.predictor.deepc import reduce
 from quadriga.agents.predictor.episode import Episode
@@ -87,7 +86,7 @@ class Local:
         self._G_past = [np.ascontiguousarray(predictor.block(i, i)[:, :past]) for i in robots]
         self._planners = [Planner(config, i, predictor) for i in robots]
         self._problems: dict[tuple[int, bytes], PlannerProblem] = {}
-        self._solvers: dict[tuple[str, int, bytes], Solver] = {}
+        self._solvers: dict[tuple[str, int, bytes], DaqpSolver] = {}
 
     def cases(self, tick: PlanningTick) -> list[Case]:
         """The plans of one step; also makes the set-up that all ticks share."""
@@ -144,7 +143,7 @@ class Local:
     def _whole_tick(self, case: Case) -> Array:
         (i,), tick = case.robots, case.tick
         planner, inputs = self._planners[i], tick.inputs[i]
-        terms = planner.peer_terms(PeerTerms(), tick.selections[i], inputs.step, tick.base_before)
+        terms = planner.peer_terms(tick.selections[i], inputs.step, tick.base_before)
         return planner.step(planner.initial(), inputs, terms)[1].du.ravel()
 
     def _free(self, tick: PlanningTick, i: int) -> Array:
@@ -230,7 +229,7 @@ class TeamDeepc:
 
         return [Contender("eq. 5", AS_WRITTEN, as_written), Contender("eq. 5", "daqp", ours)]
 
-    def _build(self, stance: bytes) -> tuple[PlannerProblem, Solver]:
+    def _build(self, stance: bytes) -> tuple[PlannerProblem, DaqpSolver]:
         pattern = np.frombuffer(stance, dtype=np.bool_).reshape(-1, 4)
         condensed = select(self._model, stance_columns(pattern))
         problem = constrain(self._config.planner, self._config.robot.weight, condensed, pattern)

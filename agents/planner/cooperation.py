@@ -43,7 +43,13 @@ from numpy.typing import NDArray
 from scipy import linalg
 from scipy.sparse.linalg import eigsh
 
-from quadriga.agents.planner.qp import Condensed, PlannerProblem, constrain, stance_columns
+from quadriga.agents.planner.qp import (
+    NO_BOUNDS,
+    Condensed,
+    PlannerProblem,
+    constrain,
+    stance_columns,
+)
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.time_grid import distinct_steps, horizon_stance, phase_of
 from quadriga.shared.config.sections import Config
@@ -279,6 +285,8 @@ def kept_share(config: Config) -> float:
     radius tells whether that is enough. Few robots converge without and are not damped.
     """
     planner, n = config.planner, config.team.robots
+    if planner.output_bounds != NO_BOUNDS:  # a last plan may break them by now
+        return 0.0
     if planner.damping != _BY_SIZE:
         return planner.damping
     return 0.0 if n <= _FREE.get(planner.preset, _FREE_ELSE) else (n - 2) / (n + 2)
@@ -290,5 +298,5 @@ def kept_by_agent(config: Config) -> float:
     One that plans as if it were alone answers nobody: no iteration is there to be damped, and the
     size of the team is nothing to it.
     """
-    answers = find_kind(config.planner.kind).needs_peers
-    return kept_share(config) if answers else max(0.0, config.planner.damping)
+    answers, by_size = find_kind(config.planner.kind).needs_peers, config.planner.damping < 0.0
+    return 0.0 if by_size and not answers else kept_share(config)

@@ -1,4 +1,4 @@
-"""The peers' terms of eq. 11, from their newest messages; those of a silent peer are held."""
+"""The peers' terms of eq. 11, from their newest messages."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from quadriga.agents.planner.cooperation import (
     peer_slope,
     team_slope,
 )
-from quadriga.agents.planner.peers import USABLE, PeerData, PeerSelection
+from quadriga.agents.planner.peers import USABLE, PeerSelection
 from quadriga.agents.planner.qp import stance_columns
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.time_grid import horizon_stance, phase_of, place_in, walking_steps
@@ -31,9 +31,6 @@ class PeerTerms:
         effect: Σ G_ij [u_ini; y_ini; u] over the peers, (6 N,).
         slope: Σ M_ij [u_ini; y_ini; u] over the peers, what they add to the slope of the team's
             cost by own stance forces, (nv,); 0 where each agent has its own cost.
-        deviations: [u_ini; y_ini; u] of each peer with a usable plan, (18 T_ini + 12 N,).
-        held: last effect of each silent peer, (6 N,); where the cost is the team's, on all robots,
-            (6 N n,).
         steps: planning step, and step at which the peers' windows end.
         used: step of the plan used, by peer.
         lost: peers given up; the agent stops if there are any.
@@ -42,8 +39,6 @@ class PeerTerms:
 
     effect: Array | float = 0.0
     slope: Array | float = 0.0
-    deviations: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
-    held: Mapping[str, Array] = field(default_factory=dict)
     steps: tuple[int, int] = (0, 0)
     used: Mapping[str, int] = field(default_factory=dict)
     lost: tuple[str, ...] = ()
@@ -62,7 +57,6 @@ class Peers:
     def __init__(self, config: Config, index: int, predictor: Predictor) -> None:
         self._config, self._index, self._predictor = config, index, predictor
         self._others = [j for j in range(config.team.robots) if j != index]
-        self._outputs, self._width = N_OUTPUTS * config.planner.N, predictor.meta.width
         # Memo of the couplings, one for each step of the gait's cycle; it changes no result.
         self._couplings: dict[tuple[int, int], Coupling] = {}
         self._cycle = walking_steps(config)
@@ -75,71 +69,34 @@ class Peers:
             for steps in behind:
                 self._coupling(step, step - steps)
 
-    def terms(
-        self, before: PeerTerms, selection: PeerSelection, step: int, y_base: Array
-    ) -> PeerTerms:
-        """The peers' terms of eq. 11 for planning step `step`; of silent peers their last share.
+    def terms(self, selection: PeerSelection, step: int, y_base: Array) -> PeerTerms:
+        """The peers' terms of eq. 11 for planning step `step`.
 
         Args:
-            before: terms of the step before.
             selection: the peers' windows and plans.
             step: k, whose contact phase chooses the transition matrix.
             y_base: base of the outputs at the ends of the windows' samples, (T_ini, 6).
         """
         if not selection.peers:
             return PeerTerms()
-        z = np.zeros(len(self._others) * self._width, dtype=np.float32)
-        deviations, held = dict[str, NDArray[np.float32]](), dict[str, Array]()
+        z = np.zeros((len(self._others), self._predictor.meta.width), dtype=np.float32)
         for peer in selection.peers:
             if peer.status == USABLE:
                 dy = np.where(peer.known[:, None], peer.y_ini - y_base, 0.0)
-                part = deviations[peer.robot] = self._part(z, peer.index)
-                part[:] = np.concatenate([peer.du_ini.ravel(), dy.ravel(), peer.du.ravel()])
-                continue
-            share = self._last_share(before, peer)
-            if share is not None:
-                held[peer.robot] = share
-        total = self._coupling(step, selection.window_step).effect(z)
-        effect, slope = total[: self._outputs], total[self._outputs :]
-        for share in held.values():
-            if not self._cooperative:
-                effect += share
-                continue
-            effect += share[self._index * self._outputs :][: self._outputs]
-            slopes = self._slopes(step)
-            slope += np.tensordot(slopes, share.reshape(len(slopes), -1), axes=([0, 2], [0, 1]))
+                part = z[peer.index - (peer.index > self._index)]
+                past = peer.du_ini.size
+                part[:past], part[past : past + dy.size] = peer.du_ini.ravel(), dy.ravel()
+                part[past + dy.size :] = peer.du.ravel()
+        total = self._coupling(step, selection.window_step).effect(z.ravel())
+        outputs = N_OUTPUTS * self._config.planner.N
         return PeerTerms(
-            effect,
-            slope if self._cooperative else 0.0,
-            deviations,
-            held,
+            total[:outputs],
+            total[outputs:] if self._cooperative else 0.0,
             (step, selection.window_step),
             selection.used,
             selection.lost,
             {peer.robot: peer.age for peer in selection.peers},
         )
-
-    def _last_share(self, before: PeerTerms, peer: PeerData) -> Array | None:
-        """A silent peer's last share of the effect, see `PeerTerms.held`; None if it sent no plan.
-
-        It is computed for the steps of the peer's last deviations: legs that stood then swing now.
-        """
-        deviation = before.deviations.get(peer.robot)
-        if deviation is None:
-            return before.held.get(peer.robot)
-        if self._cooperative:
-            phase = self._phase(before.steps[0])
-            robots = range(self._config.team.robots)
-            blocks = [self._predictor.block(j, peer.index, phase) for j in robots]
-            return np.concatenate([block @ deviation for block in blocks])
-        z = np.zeros(len(self._others) * self._width, dtype=np.float32)
-        self._part(z, peer.index)[:] = deviation
-        return self._coupling(*before.steps).effect(z)
-
-    def _part(self, z: NDArray[np.float32], index: int) -> NDArray[np.float32]:
-        """The part of all peers' deviations `z` that belongs to one peer, as a view."""
-        place = self._width * (index - (index > self._index))
-        return z[place : place + self._width]
 
     def _coupling(self, step: int, window_step: int) -> Coupling:
         """The coupling at planning step `step` to plans that begin at `window_step`."""
@@ -152,23 +109,15 @@ class Peers:
 
     def _blocks(self, step: int) -> list[Array]:
         """G_ij of each peer; with the team's cost [G_ij; M_ij]."""
-        phase = self._phase(step)
-        blocks = [self._predictor.block(self._index, j, phase) for j in self._others]
+        config, index, predictor = self._config, self._index, self._predictor
+        phase = phase_of(config, step, predictor.phases)
+        blocks = [predictor.block(index, j, phase) for j in self._others]
         if not self._cooperative:
             return blocks
-        slopes = self._slopes(step)
-        return [
-            np.concatenate([block, peer_slope(slopes, self._predictor, j, phase)])
-            for block, j in zip(blocks, self._others, strict=True)
-        ]
-
-    def _slopes(self, step: int) -> Array:
-        """See `team_slope`."""
-        stance = horizon_stance(self._config, self._index, step)
-        return team_slope(self._config, self._predictor, self._index, self._phase(step), stance)
-
-    def _phase(self, step: int) -> int:
-        return phase_of(self._config, step, self._predictor.phases)
+        stance = horizon_stance(config, index, step)
+        slopes = team_slope(config, predictor, index, phase, stance)
+        rows = [peer_slope(slopes, predictor, j, phase) for j in self._others]
+        return [np.concatenate(pair) for pair in zip(blocks, rows, strict=True)]
 
 
 class Coupling:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import replace
 from typing import Any, Final, TypeVar
 
 import numpy as np
@@ -25,8 +24,8 @@ from quadriga.shared.runtime.record import record
 from quadriga.shared.topics import MEASUREMENT, SAMPLE_MS
 
 USABLE: Final = "usable"  # the newest plan that may be used, shifted by its age
-HELD: Final = "held"  # too old: the effect of the peer's last terms stays in force
-LOST: Final = "lost"  # held long enough, or the peer has stopped: the team stops
+SILENT: Final = "silent"  # that plan is too old: the peer counts as doing nothing
+LOST: Final = "lost"  # silent for too long, or the peer has stopped: the team stops
 
 M = TypeVar("M", bound=Measurement | Plan)
 
@@ -54,7 +53,7 @@ class PeerData:
     Attributes:
         robot: the peer's name.
         index: its place in the team, 0-based.
-        status: usable, held or lost; the arrays of a held or lost peer must not be used.
+        status: usable, silent or lost; only the arrays of a usable peer are of use.
         step: step of the plan used, or None while the peer has never planned.
         age: number of steps by which that plan is older than the newest one allowed.
         known: samples of the window that are measured or predicted, shape (T_ini,).
@@ -139,33 +138,34 @@ class Neighbours:
         the future, is a plan of another horizon, or has implausible numbers (`is_plausible`).
         """
         peers, refused = dict(memory.peers), memory.refused
-        oldest = tick - self._span_ms
-        for robot, sample in measurements:
+        arrived: list[tuple[str, Measurement | Plan]] = [*measurements, *plans]
+        for robot, message in arrived:
             history = peers.get(robot)
-            if history is None or not self._is_usable(sample, SAMPLE_MS, tick):
+            if history is None or not self._is_usable(message, tick):
                 refused += 1
                 continue
-            samples = _insert(history.measurements, sample, oldest, lambda item: item.tick)
-            refused += samples is history.measurements
-            peers[robot] = PeerHistory(samples, history.plans)
-        for robot, plan in plans:
-            history, length = peers.get(robot), self._config.planner.N
-            on_grid = plan.step * self._step_ms == plan.tick and len(plan.u) == length
-            if history is None or not (on_grid and self._is_usable(plan, self._step_ms, tick)):
-                refused += 1
-                continue
-            kept = _insert(history.plans, plan, oldest, lambda item: item.serial)
-            refused += kept is history.plans
-            peers[robot] = PeerHistory(history.measurements, kept)
+            if isinstance(message, Plan):
+                held = _insert(history.plans, message, tick - self._span_ms, _by_serial)
+                refused += held is history.plans
+                peers[robot] = PeerHistory(history.measurements, held)
+            else:
+                known = _insert(history.measurements, message, tick - self._span_ms, _by_tick)
+                refused += known is history.measurements
+                peers[robot] = PeerHistory(known, history.plans)
         return PeerMemory(peers, refused)
 
-    def _is_usable(self, message: Measurement | Plan, grid_ms: int, now: int) -> bool:
-        """Whether a message is of this time and has numbers that a robot can mean.
+    def _is_usable(self, message: Measurement | Plan, now: int) -> bool:
+        """Whether a message is of this time and grid, and has numbers that a robot can mean.
 
         A peer's clock may lead by a little; messages far ahead would push out all real ones.
         """
-        timely = now - self._span_ms <= message.tick <= now + self._step_ms
-        on_grid = message.tick % grid_ms == 0
+        tick = message.tick
+        if isinstance(message, Plan):
+            of_step = message.step * self._step_ms == tick
+            on_grid = of_step and len(message.u) == self._config.planner.N
+        else:
+            on_grid = tick % SAMPLE_MS == 0
+        timely = now - self._span_ms <= tick <= now + self._step_ms
         return timely and on_grid and is_plausible(self._config, message.u, message.y)
 
     def are_ready(self, memory: PeerMemory, tick: int) -> bool:
@@ -180,14 +180,6 @@ class Neighbours:
             )
             for history in memory.peers.values()
         )
-
-    def forget_plans(self, memory: PeerMemory, before: int) -> PeerMemory:
-        """The memory without plans of before a tick."""
-        peers = {
-            name: replace(history, plans=tuple(p for p in history.plans if p.tick >= before))
-            for name, history in memory.peers.items()
-        }
-        return replace(memory, peers=peers)
 
     def is_complete(self, memory: PeerMemory, serial: tuple[int, int]) -> bool:
         """Whether every peer's plan of this step and exchange is there, and its window before it.
@@ -224,7 +216,7 @@ class Neighbours:
         Args:
             memory: what has been remembered.
             last: newest step whose plans and samples are looked at; with the one-step delay k−1.
-            first_step: the team's first planning step.
+            first_step: the first planning step of the team, or since it walks again.
             window_step: planning step at which the windows end: `last`, as in eq. 11, or a later
                 one, which moves windows and plans forward and takes samples not measured yet from
                 the plans.
@@ -250,11 +242,12 @@ class Neighbours:
         self, history: PeerHistory, last: int, first_step: int
     ) -> tuple[str, int, tuple[Plan, ...]]:
         """Status of a peer at step `last`, the age of its newest plan, and its plans until then."""
-        plans = tuple(plan for plan in history.plans if plan.step <= last)
+        oldest = first_step - patience(self._config)  # what is older was made before a stop
+        plans = tuple(plan for plan in history.plans if oldest <= plan.step <= last)
         age = last - (plans[-1].step if plans else first_step - 1)
         if age > patience(self._config) or self._has_stopped(history, plans, last):
             return LOST, age, plans
-        return HELD if age > self._config.planner.max_peer_age else USABLE, age, plans
+        return SILENT if age > self._config.planner.max_peer_age else USABLE, age, plans
 
     def _has_stopped(self, history: PeerHistory, plans: tuple[Plan, ...], last: int) -> bool:
         """Whether a peer has come to stand since its newest plan: it makes none any more."""
@@ -304,6 +297,14 @@ def _plan_at(plans: tuple[Plan, ...], start: int) -> tuple[Array, Array] | None:
 def _stands(sample: Measurement) -> bool:
     """Whether a peer stands on all four feet."""
     return bool((sample.stance > 0.5).all())
+
+
+def _by_tick(measurement: Measurement) -> int:
+    return measurement.tick
+
+
+def _by_serial(plan: Plan) -> tuple[int, int]:
+    return plan.serial
 
 
 def _insert(held: tuple[M, ...], new: M, oldest: int, order: Callable[[M], Any]) -> tuple[M, ...]:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +16,19 @@ from quadriga.agents.planner.cooperation import (
     new_plan_share,
     stay_near_last,
 )
+from quadriga.agents.planner.foot_limits import FAILED, ForceQp, minimise
 from quadriga.agents.planner.peer_terms import Peers, PeerTerms
 from quadriga.agents.planner.peers import PeerSelection
-from quadriga.agents.planner.qp import PlannerProblem, Residuals, build_problem
-from quadriga.agents.planner.solver import NOMINAL, SOLVED, SOLVERS, SolvedQp, Solver, no_solution
-from quadriga.agents.plausibility import OUTPUT_MAX
+from quadriga.agents.planner.qp import PlannerProblem, Residuals, build_problem, unpack
+from quadriga.agents.planner.solver import (
+    NOMINAL,
+    SOLVED,
+    SOLVERS,
+    DaqpSolver,
+    SolvedQp,
+    no_solution,
+)
+from quadriga.agents.plausibility import OUTPUT_MAX, are_plausible_outputs
 from quadriga.agents.predictor.predictor import Predictor, check_sizes
 from quadriga.agents.time_grid import horizon_stance, phase_of, place_in, walking_steps
 from quadriga.shared.codes import with_detail
@@ -31,6 +38,7 @@ from quadriga.shared.runtime.jit import compiled
 from quadriga.shared.runtime.record import record
 
 IMPLAUSIBLE: Final = "implausible"
+_Planned = tuple[Array, Array, Array, Array, tuple[float, float, float], int]
 
 
 @record
@@ -62,6 +70,10 @@ class PlannerInputs:
         du = self.u_ini - nominal_forces(self.stance_ini, self.weight)
         return np.concatenate([du.ravel(), (self.y_ini - self.y_base_ini).ravel()])
 
+    def wanted(self) -> Array:
+        """Deviations y_des from the base. Shape (6 N,)."""
+        return (self.y_des - self.y_base).ravel()
+
 
 @record
 class PlannerState:
@@ -91,8 +103,6 @@ class PlanResult:
         du: their deviation from nominal, (N, 12), N.
         y: predicted outputs under u, (N, 6); the desired ones where the prediction is implausible.
         y_nominal: predicted outputs under nominal forces, as of a plan not applied, (N, 6).
-        used: step of the plan used, by peer.
-        lost: peers given up; the agent stops if there are any.
         residuals: optimality of the QP's solution.
         iterations: of the QP solver.
     """
@@ -102,19 +112,29 @@ class PlanResult:
     du: Array
     y: Array
     y_nominal: Array
-    used: Mapping[str, int]
-    lost: tuple[str, ...]
     residuals: Residuals
     iterations: int
 
 
+class _Prediction(NamedTuple):
+    """See `Condensed`, `PlannerProblem`; nominal forces by stance pattern, (16, 12), N."""
+
+    Y_past: Array
+    Y_v: Array
+    F_des: Array
+    columns: NDArray[np.int64]
+    nominal: Array  # forces of the horizon, (N, 12), N
+    nominal_table: Array
+
+
 @record
 class _Setup:
-    """Set-up of one step of the gait's cycle; nominal forces of the horizon, (N, 12), N."""
+    """Set-up of one step of the gait's cycle; no deviation of the QP's forces, (nv,), N."""
 
     problem: PlannerProblem
-    solver: Solver
-    nominal: Array
+    solver: DaqpSolver
+    prediction: _Prediction
+    none: Array
 
 
 class Planner:
@@ -136,7 +156,6 @@ class Planner:
         self._cooperative = is_cooperative(config)
         self._kept = 0.0 if self._cooperative else kept_by_agent(config)
         self._new_share = new_plan_share(config, predictor) if self._cooperative else 1.0
-        self._nominal_table = nominal_table(config.robot.weight)
         # Memo of the set-ups, one for each step of the gait's cycle; it changes no result.
         self._setups: dict[int, _Setup] = {}
         for step in self._cycle:
@@ -146,14 +165,10 @@ class Planner:
         """No plan made yet."""
         return PlannerState()
 
-    def peer_terms(
-        self, before: PeerTerms, selection: PeerSelection, step: int, y_base: Array
-    ) -> PeerTerms:
+    def peer_terms(self, selection: PeerSelection, step: int, y_base: Array) -> PeerTerms:
         """See `Peers.terms`."""
-        return self._peers.terms(before, selection, step, y_base)
+        return self._peers.terms(selection, step, y_base)
 
-    # Any number may be measured; one that overflows shows in the result.
-    @np.errstate(over="ignore", invalid="ignore")
     def step(
         self, state: PlannerState, inputs: PlannerInputs, peers: PeerTerms
     ) -> tuple[PlannerState, PlanResult]:
@@ -165,57 +180,84 @@ class Planner:
             peers: the peers' terms of eq. 11.
         """
         setup = self._setup(inputs.step)
-        y_free, error, solved = self._solve(setup, state, inputs, peers)
-        problem, solution = solved.problem, solved.solution
-        x, status = solution.x, solution.status
-        if self._kept and status == SOLVED:
-            # Both keep the limits of forces; these are convex, so the mixture keeps them too.
-            last = self._last(problem, state, inputs.step)
-            if problem.keeps_outputs(last, error):
-                x = (1.0 - self._kept) * x + self._kept * last
-        u, du, y, y_nominal, plausible = _unpack(
-            x, y_free, inputs.y_base, problem.condensed.Y_v, problem.columns, setup.nominal
-        )
-        if not plausible:
-            # The outputs cannot be predicted: nominal forces, and the desired outputs as a guess.
-            u, du, y, y_nominal = setup.nominal, np.zeros_like(du), inputs.y_des, inputs.y_des
-            status = IMPLAUSIBLE if status == SOLVED else status
-        status = SOLVED if status == SOLVED else with_detail(NOMINAL, status)
-        about = peers.used, peers.lost, solution.residuals, solution.iterations
-        result = PlanResult(status, u, du, y, y_nominal, *about)
-        return PlannerState(inputs.step, du, y, state.solves + (not peers.lost)), result
+        forces, outputs, y_free, f, proof, solutions = self._plan(setup, state, inputs, peers)
+        if solutions == FAILED:
+            result = self._fall_back(setup, state, inputs, peers, y_free, f)
+        else:
+            residuals = Residuals(*proof) if solutions else setup.solver.exact
+            plan = forces[0], forces[1], outputs[0], outputs[1]
+            result = PlanResult(SOLVED, *plan, residuals, solutions)
+        solves = state.solves + (not peers.lost)
+        return PlannerState(inputs.step, result.du, result.y, solves), result
 
-    @np.errstate(over="ignore", invalid="ignore")
     def problem_of(
         self, state: PlannerState, inputs: PlannerInputs, peers: PeerTerms
     ) -> SolvedQp | None:
         """The QP of `step` for the same arguments; None if a peer is lost: then no QP is solved."""
         if peers.lost:
             return None
-        return self._solve(self._setup(inputs.step), state, inputs, peers)[2]
+        setup = self._setup(inputs.step)
+        _, _, y_free, f, _, _ = self._plan(setup, state, inputs, peers)
+        with np.errstate(over="ignore", invalid="ignore"):
+            error = y_free - inputs.wanted()
+            solution = setup.solver.solve(f, error)
+        return SolvedQp(setup.problem, f, *setup.problem.bounds(error), solution)
 
-    def _solve(
+    def _plan(
         self, setup: _Setup, state: PlannerState, inputs: PlannerInputs, peers: PeerTerms
-    ) -> tuple[Array, Array, SolvedQp]:
-        """Build and solve the QP of a step; with y_free of eq. 11 and that less y_des, (6 N,)."""
-        problem, effect = setup.problem, peers.effect
-        condensed = problem.condensed
-        if not isinstance(effect, np.ndarray):  # one type: machine code is made for each
-            effect = np.full(len(condensed.Y_past), effect)
-        past, y_free, error, f = _respond(
-            (inputs.u_ini, inputs.y_ini, inputs.stance_ini, inputs.y_base_ini),
-            (inputs.y_base, inputs.y_des),
-            effect,
-            (self._nominal_table, condensed.Y_past, condensed.F_des),
-            self._cooperative,
-        )
-        if self._cooperative:
-            f = f + condensed.F_past @ past + peers.slope
+    ) -> _Planned:
+        """See `_plan_step`."""
+        problem, f, last, effect = setup.problem, setup.none[:0], setup.none, peers.effect
+        if self._cooperative or self._kept:
             last = self._last(problem, state, inputs.step)
-            innovation = self._innovation(past, state, inputs)
-            f = stay_near_last(problem, f, self._new_share, last, innovation)
-        solution = no_solution(problem, PEER_LOST) if peers.lost else setup.solver.solve(f, error)
-        return y_free, error, SolvedQp(problem, f, *problem.bounds(error), solution)
+        # Any number may be measured; one that overflows shows in the result.
+        if self._cooperative:
+            with np.errstate(over="ignore", invalid="ignore"):
+                past = inputs.past()
+                f = problem.linear_term(past, inputs.wanted()) + peers.slope
+                innovation = self._innovation(past, state, inputs)
+                f = stay_near_last(problem, f, self._new_share, last, innovation)
+        if not isinstance(effect, np.ndarray):  # one type: machine code is made for each
+            effect = np.full(len(setup.prediction.Y_past), effect)
+        window = inputs.u_ini, inputs.y_ini, inputs.stance_ini, inputs.y_base_ini
+        return _plan_step(
+            (*window, inputs.y_base, inputs.y_des),
+            effect,
+            f,
+            (self._kept, last),
+            setup.prediction,
+            setup.solver.force_qp,
+            setup.solver.limits_feet and not peers.lost,
+        )
+
+    @np.errstate(over="ignore", invalid="ignore")
+    def _fall_back(
+        self,
+        setup: _Setup,
+        state: PlannerState,
+        inputs: PlannerInputs,
+        peers: PeerTerms,
+        y_free: Array,
+        f: Array,
+    ) -> PlanResult:
+        """The plan by a solver, or nominal forces where there is none."""
+        problem = setup.problem
+        if peers.lost:
+            solution = no_solution(problem, PEER_LOST)
+        else:
+            solution = setup.solver.solve(f, y_free - inputs.wanted())
+        x, status = solution.x, solution.status
+        if self._kept and status == SOLVED:
+            x = (1.0 - self._kept) * x + self._kept * self._last(problem, state, inputs.step)
+        du, dy = unpack(problem, x, y_free)
+        y, y_nominal = inputs.y_base + dy, inputs.y_base + y_free.reshape(dy.shape)
+        if not (are_plausible_outputs(y) and are_plausible_outputs(y_nominal)):
+            # The outputs cannot be predicted: nominal forces, and the desired outputs as a guess.
+            du, y, y_nominal = np.zeros_like(du), inputs.y_des, inputs.y_des
+            status = IMPLAUSIBLE if status == SOLVED else status
+        status = SOLVED if status == SOLVED else with_detail(NOMINAL, status)
+        u = setup.prediction.nominal + du
+        return PlanResult(status, u, du, y, y_nominal, solution.residuals, solution.iterations)
 
     def _last(self, problem: PlannerProblem, state: PlannerState, step: int) -> Array:
         """The last plan's deviations of the QP's forces, brought forward to a step. (nv,), N."""
@@ -255,67 +297,69 @@ class Planner:
             G = self._predictor.block(index, index, phase)
             problem = build_problem(config.planner, weight, G[:, past:], stance, G[:, :past])
         solver = SOLVERS[config.planner.solver](problem)
-        return _Setup(problem, solver, nominal_forces(stance, weight))
-
-
-# The processor's caches are lost between two steps, so a step takes mostly the time to load its
-# code and data: what surrounds the QP is compiled too.
+        condensed, nominal = problem.condensed, nominal_forces(stance, weight)
+        matrices = condensed.Y_past, condensed.Y_v, condensed.F_des
+        prediction = _Prediction(*matrices, problem.columns, nominal, nominal_table(weight))
+        return _Setup(problem, solver, prediction, np.zeros(len(problem.columns)))
 
 
 @compiled
-def _respond(
-    window: tuple[Array, Array, NDArray[np.bool_], Array],
-    horizon: tuple[Array, Array],
+def _plan_step(
+    own: tuple[Array, Array, NDArray[np.bool_], Array, Array, Array],
     effect: Array,
-    matrices: tuple[Array, Array, Array],
-    cooperative: bool,
-) -> tuple[Array, Array, Array, Array]:
-    """What the QP of a step is made of.
+    f: Array,
+    last: tuple[float, Array],
+    prediction: _Prediction,
+    qp: ForceQp,
+    limits_feet: bool,
+) -> _Planned:
+    """Build, solve and unpack the QP of a step, in one call; without the fallback.
+
+    The caches are lost between two steps: it takes mostly the time to load its code and data.
 
     Args:
-        window: u_ini, y_ini, stance_ini and y_base_ini, see `PlannerInputs`.
-        horizon: y_base and y_des.
+        own: u_ini, y_ini, stance_ini, y_base_ini, y_base and y_des, see `PlannerInputs`.
         effect: of the peers on own outputs, (6 N,).
-        matrices: nominal forces by stance pattern, (16, 12), N; Y_past and F_des, see `Condensed`.
-        cooperative: whether F_des belongs to the team's cost.
+        f: linear term of the team's cost, (nv,); empty: that of the own cost.
+        last: share of the last plan that is kept; its forces, (nv,), N.
+        prediction: of the stance pattern.
+        qp: likewise.
+        limits_feet: whether `qp` is all of the QP, which then is solved here.
 
     Returns:
-        Past deviations, (18 T_ini,); the free response, output deviations under nominal forces,
-        y_free of eq. 11, (6 N,); that less the desired ones; the linear term of the own cost, or
-        the part of the team's that y_des makes, (nv,).
+        u and du, (2, N, 12), y and y_nominal, (2, N, 6), see `PlanResult`; the free response y_free
+        of eq. 11, (6 N,); f; residuals and number of solutions of the QP's `Minimum`.
     """
-    u_ini, y_ini, stance_ini, y_base_ini = window
-    y_base, y_des = horizon
-    table, Y_past, F_des = matrices
-    T_ini = len(u_ini)
+    # Unpacked before the loops: each access to a tuple in a loop costs a reference count.
+    u_ini, y_ini, stance_ini, y_base_ini, y_base, y_des = own
+    Y_past, Y_v, F_des, columns, nominal, nominal_table = prediction
+    (kept, x_last), T_ini, N = last, len(u_ini), len(y_des)
     past = np.empty(T_ini * (N_FORCES + N_OUTPUTS))
     for k in range(T_ini):
         pattern = 0
         for leg in range(4):
             pattern = 2 * pattern + stance_ini[k, leg]
-        past[N_FORCES * k : N_FORCES * (k + 1)] = u_ini[k] - table[pattern]
+        past[N_FORCES * k : N_FORCES * (k + 1)] = u_ini[k] - nominal_table[pattern]
         at = N_FORCES * T_ini + N_OUTPUTS * k
         past[at : at + N_OUTPUTS] = y_ini[k] - y_base_ini[k]
     y_free = Y_past @ past + effect
-    wanted = (y_des - y_base).ravel()
-    f = F_des @ (wanted if cooperative else wanted - y_free)
-    return past, y_free, y_free - wanted, f
-
-
-@compiled
-def _unpack(
-    x: Array, y_free: Array, y_base: Array, Y_v: Array, columns: NDArray[np.int64], nominal: Array
-) -> tuple[Array, Array, Array, Array, bool]:
-    """Forces and their deviations, (N, 12), outputs with x and with 0, (N, 6); all plausible?"""
-    deviation = np.zeros(nominal.size)
+    if not len(f):
+        f = F_des @ ((y_des - y_base).ravel() - y_free)
+    x, proof, solutions = x_last, (0.0, 0.0, 0.0), FAILED
+    if limits_feet:
+        found = minimise(qp, f)
+        x, solutions = found.v, found.solutions
+        proof = found.stationarity, found.primal, found.complementarity
+    if kept:
+        x = (1.0 - kept) * x + kept * x_last
+    forces, outputs = np.zeros((2, N, N_FORCES)), np.empty((2, N, N_OUTPUTS))
+    du = forces[1].ravel()
     for i in range(len(columns)):
-        deviation[columns[i]] = x[i]
-    du = deviation.reshape(nominal.shape)
-    y = y_base + (y_free + Y_v @ x).reshape(y_base.shape)
-    y_nominal = y_base + y_free.reshape(y_base.shape)
-    plausible = True
-    for outputs in (y, y_nominal):
-        for output in outputs.flat:
-            if not abs(output) <= OUTPUT_MAX:
-                plausible = False
-    return nominal + du, du, y, y_nominal, plausible
+        du[columns[i]] = x[i]
+    forces[0] = nominal + forces[1]
+    outputs[0] = y_base + (y_free + Y_v @ x).reshape(N, N_OUTPUTS)
+    outputs[1] = y_base + y_free.reshape(N, N_OUTPUTS)
+    for output in outputs.flat:
+        if not abs(output) <= OUTPUT_MAX:
+            solutions = FAILED
+    return forces, outputs, y_free, f, proof, solutions

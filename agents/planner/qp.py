@@ -19,6 +19,7 @@ from quadriga.agents.gait import nominal_forces
 from quadriga.shared.config.sections import PlannerConfig
 from quadriga.shared.robots.conventions import N_FORCES, N_OUTPUTS, Array
 from quadriga.shared.runtime.jit import compiled
+from quadriga.shared.runtime.record import record
 
 NO_BOUNDS: Final = "none"
 # An answer with larger residuals is not used, whatever status the solver reports.
@@ -102,14 +103,6 @@ class PlannerProblem:
         lower[-rows:] -= error[self.bounded]
         upper[-rows:] -= error[self.bounded]
         return lower, upper
-
-    def keeps_outputs(self, v: Array, error: Array) -> bool:
-        """Whether forces v, shape (nv,), keep the bounds on outputs, if there are any."""
-        if not len(self.bounded):
-            return True
-        (lower, upper), rows = self.bounds(error), slice(-len(self.bounded), None)
-        y = self.A[rows] @ v
-        return bool((lower[rows] <= y).all() and (y <= upper[rows]).all())
 
 
 def condense(
@@ -199,7 +192,7 @@ def unpack(problem: PlannerProblem, v: Array, y_free: Array) -> tuple[Array, Arr
 # ---- how well an answer fulfils the Karush-Kuhn-Tucker conditions
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Residuals:
     """How well the Karush-Kuhn-Tucker conditions hold.
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import MappingProxyType
-from typing import Final, Protocol
+from typing import Final
 
 import daqp
 import numpy as np
@@ -22,6 +22,7 @@ from quadriga.agents.planner.qp import (
     residuals,
 )
 from quadriga.shared.robots.conventions import Array
+from quadriga.shared.runtime.record import record
 
 SOLVED: Final = "solved"
 NOMINAL: Final = "nominal"  # code of a plan's status: no solution, hence the nominal forces
@@ -32,7 +33,7 @@ _DAQP_STATUS: Final = MappingProxyType({
 })  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class QpSolution:
     """A solver's answer; `x` is zero, that is no deviation, unless the status is "solved"."""
 
@@ -43,7 +44,7 @@ class QpSolution:
     iterations: int
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class SolvedQp:
     """A QP of one step, min ½ xᵀ H x + fᵀ x, lower ≤ [x; A x] ≤ upper, with its answer.
 
@@ -61,37 +62,26 @@ class SolvedQp:
     solution: QpSolution
 
 
-class Solver(Protocol):
-    """Solves one `PlannerProblem` for any f and bounds; no answer depends on earlier solves."""
-
-    def __init__(self, problem: PlannerProblem) -> None: ...
-
-    def solve(self, f: Array, error: Array | None = None) -> QpSolution:
-        """The minimiser, or the reason why there is none. Never raises for a bad f.
-
-        Args:
-            f: linear term, shape (nx,).
-            error: that bounds of outputs depend on, see `PlannerProblem.bounds`.
-        """
-        ...
-
-
 class DaqpSolver:
-    """The closed form while no limit is active, then `foot_limits.minimise`, else DAQP.
+    """Solves one `PlannerProblem` for any f: by `foot_limits.minimise`, else by DAQP.
 
-    All are exact, and no solve knows of the ones before it, so that equal data give equal bits.
-    DAQP, a dense dual active set, solves what bounds outputs and what the second leaves.
+    Both are exact, and no solve knows of the ones before it, so that equal data give equal bits.
+    DAQP, a dense dual active set, solves what bounds outputs and what the first leaves.
+
+    Attributes:
+        force_qp: the QP without bounds of outputs, for compiled code.
+        limits_feet: whether compiled code may answer: that is all there is to the QP.
+        exact: residuals of −H⁻¹ f, the optimum while no limit is active: bounds for any f.
     """
 
     def __init__(self, problem: PlannerProblem) -> None:
         self._problem = problem
-        inverse = linalg.inv(problem.H)
+        H, inverse = np.ascontiguousarray(problem.H), linalg.inv(problem.H)
         bounds = np.ascontiguousarray(problem.lower), np.ascontiguousarray(problem.upper)
-        qp = ForceQp(np.ascontiguousarray(problem.H), -inverse, *bounds, problem.slope)
-        # Of −H⁻¹ f, the optimum while no limit is active: bounds for any f.
-        self._exact = Residuals(_inversion_error(problem.H, inverse), 0, 0)
-        usable = self._exact.stationarity <= MAX_STATIONARITY and not len(problem.bounded)
-        self._qp = qp if usable and has_foot_limits(qp) else None
+        self.force_qp = ForceQp(H, -inverse, *bounds, problem.slope)
+        self.exact = Residuals(_inversion_error(H, inverse), 0.0, 0.0)
+        usable = self.exact.stationarity <= MAX_STATIONARITY and not len(problem.bounded)
+        self.limits_feet = usable and has_foot_limits(self.force_qp)
         self._cold = np.zeros(len(problem.upper), dtype=np.int32)
         self._model = daqp.Model()
         self._model.settings = {"primal_tol": 1e-8}
@@ -100,16 +90,21 @@ class DaqpSolver:
             problem.H, zero, problem.A, *self._within_reach(None), self._cold
         )
         # The first solve loads the code, which must not fall into a walk.
-        self.solve(zero)
+        DaqpSolver.solve(self, zero)
         self._solve_by_daqp(zero, None)
 
     def solve(self, f: Array, error: Array | None = None) -> QpSolution:
-        """See `Solver`."""
-        if self._qp is not None:
-            found = minimise(self._qp, f)
+        """The minimiser, or the reason why there is none. Never raises for a bad f.
+
+        Args:
+            f: linear term, shape (nx,).
+            error: that bounds of outputs depend on, see `PlannerProblem.bounds`.
+        """
+        if self.limits_feet:
+            found = minimise(self.force_qp, f)
             if found.solutions != FAILED:
                 proof = Residuals(found.stationarity, found.primal, found.complementarity)
-                proof = proof if found.solutions else self._exact
+                proof = proof if found.solutions else self.exact
                 return QpSolution(SOLVED, found.v, found.multipliers, proof, found.solutions)
         return self._solve_by_daqp(f, error)
 
@@ -130,23 +125,24 @@ class DaqpSolver:
         return np.minimum(upper, _FAR), np.maximum(lower, -_FAR)
 
 
-class OsqpSolver:
+class OsqpSolver(DaqpSolver):
     """Operator splitting, as in the paper; set up anew for each f so that nothing is carried.
 
-    What it does not solve is left to `DaqpSolver`: bounds that contradict each other by rounding
-    alone are a proof of infeasibility to OSQP.
+    What it does not solve is left to DAQP: bounds that contradict each other by rounding alone are
+    a proof of infeasibility to OSQP.
     """
 
     def __init__(self, problem: PlannerProblem) -> None:
-        self._problem, self._fallback = problem, DaqpSolver(problem)
+        super().__init__(problem)
+        self.limits_feet = False
         self._P = sparse.csc_matrix(np.triu(problem.H))
         self._A = sparse.csc_matrix(np.vstack([np.eye(len(problem.H)), problem.A]))
 
     def solve(self, f: Array, error: Array | None = None) -> QpSolution:
-        """See `Solver`."""
+        """See `DaqpSolver`."""
         low, high = self._problem.bounds(error)
         if not np.isfinite(f).all() or (low > high).any():
-            return self._fallback.solve(f, error)
+            return self._solve_by_daqp(f, error)
         solver = osqp.OSQP()
         solver.setup(
             self._P,
@@ -167,10 +163,10 @@ class OsqpSolver:
         y = np.where(np.isinf(low), np.maximum(y, 0.0), y)
         status, iterations = result.info.status, int(result.info.iter)
         answer = judge(self._problem, f, result.x, y, status, iterations, error)
-        return answer if answer.status == SOLVED else self._fallback.solve(f, error)
+        return answer if answer.status == SOLVED else self._solve_by_daqp(f, error)
 
 
-SOLVERS: Final[Mapping[str, type[Solver]]] = MappingProxyType(
+SOLVERS: Final[Mapping[str, type[DaqpSolver]]] = MappingProxyType(
     {"daqp": DaqpSolver, "osqp": OsqpSolver}
 )
 

@@ -40,7 +40,7 @@ from quadriga.agents.planner.qp import (
     stance_columns,
     unpack,
 )
-from quadriga.agents.planner.solver import NOMINAL, SOLVED, SOLVERS, Solver
+from quadriga.agents.planner.solver import NOMINAL, SOLVED, SOLVERS, DaqpSolver
 from quadriga.agents.predictor.deepc import Reduction, reduce
 from quadriga.agents.predictor.episode import Episode, Layout
 from quadriga.agents.predictor.predictor import Predictor, check_sizes
@@ -83,7 +83,7 @@ class TeamPlanner:
     def __init__(self, config: Config, formulation: Formulation, phases: int = 1) -> None:
         self._config, self._formulation, self._phases = config, formulation, phases
         # One factorised problem per phase and stance pattern: a memo, it changes no result.
-        self._problems: dict[tuple[int, bytes], tuple[PlannerProblem, Solver]] = {}
+        self._problems: dict[tuple[int, bytes], tuple[PlannerProblem, DaqpSolver]] = {}
         for step in walking_steps(config):
             self._problem(step, self._stance(step))
 
@@ -113,7 +113,7 @@ class TeamPlanner:
         robots = range(self._config.team.robots)
         return np.concatenate([horizon_stance(self._config, i, step) for i in robots])
 
-    def _problem(self, step: int, stance: NDArray[np.bool_]) -> tuple[PlannerProblem, Solver]:
+    def _problem(self, step: int, stance: NDArray[np.bool_]) -> tuple[PlannerProblem, DaqpSolver]:
         key = phase_of(self._config, step, self._phases), stance.tobytes()
         entry = self._problems.get(key)
         if entry is None:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import field, replace
 from typing import Final
 
-from quadriga.agents.modes import PEER_LOST, WALK, WINDOW_LOST
+from quadriga.agents.modes import PEER_LOST, WALK, WINDOW_LOST, Mode
 from quadriga.agents.planner.cooperation import brings_forward, coupled_peers
 from quadriga.agents.planner.peer_terms import PeerTerms
 from quadriga.agents.planner.peers import Neighbours, PeerMemory
@@ -25,7 +25,7 @@ from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.time_grid import exchange_ms, first_due_step, first_step, patience, step_ms
 from quadriga.shared.codes import with_detail
 from quadriga.shared.config.sections import Config
-from quadriga.shared.messages import Measurement, Plan, Reference
+from quadriga.shared.messages import Measurement, Plan
 from quadriga.shared.runtime.record import record
 from quadriga.shared.topics import SAMPLE_MS
 
@@ -42,7 +42,6 @@ class LocalState:
         terms: what the peers will do, for the planning step `terms.steps[0]`.
         inputs: what the plan of the present step was made of.
         planner: what the planner remembers.
-        begun: tick at which the robot began to walk, if that was not with its team; −1 else.
     """
 
     peers: PeerMemory
@@ -50,7 +49,6 @@ class LocalState:
     terms: PeerTerms = field(default_factory=PeerTerms)
     inputs: PlannerInputs | None = None
     planner: PlannerState = field(default_factory=PlannerState)
-    begun: int = -1
 
 
 @record
@@ -134,21 +132,18 @@ class LocalPlanning:
         self, state: LocalState, inputs: PlanningInputs
     ) -> tuple[LocalState, _Request | None, tuple[str, ...]]:
         """The state with all that has arrived, what the planner is asked now, and counters."""
-        peers, terms, own, begun = state.peers, state.terms, state.own, state.begun
-        walks, since, unusual = inputs.mode.name == WALK, inputs.mode.since, tuple[str, ...]()
-        if walks and since > self._config.gait.stand_ms and since != begun:
-            # It walks again: what was planned before it stopped is over.
-            recent = since - patience(self._config) * self._step_ms
-            peers, terms = self._neighbours.forget_plans(peers, recent), PeerTerms()
-            begun = since
+        unusual: tuple[str, ...] = ()
         if inputs.plans or inputs.measurements:
-            before = peers.refused
-            peers = self._neighbours.remember(peers, inputs.tick, inputs.measurements, inputs.plans)
-            unusual = (REFUSED,) * (peers.refused - before)
+            before, tick = state.peers, inputs.tick
+            peers = self._neighbours.remember(before, tick, inputs.measurements, inputs.plans)
+            unusual = (REFUSED,) * (peers.refused - before.refused)
+            state = replace(state, peers=peers)
         if inputs.measurement is not None:
-            own = (*own, inputs.measurement)[-self._config.planner.T_ini :]
-        state = replace(state, peers=peers, own=own, terms=terms, begun=begun)
-        return self._request(state, inputs, unusual) if walks else (state, None, unusual)
+            own = (*state.own, inputs.measurement)[-self._config.planner.T_ini :]
+            state = replace(state, own=own)
+        if inputs.mode.name != WALK:
+            return state, None, unusual
+        return self._request(state, inputs, unusual)
 
     def _request(
         self, state: LocalState, inputs: PlanningInputs, unusual: tuple[str, ...]
@@ -158,48 +153,43 @@ class LocalPlanning:
         exchanges, references = self._config.planner.exchanges, inputs.references
         if off == exchange == 0 and step >= self._first_step:
             if is_gapless(state.own, self._config.planner.T_ini, inputs.tick):
-                terms = self._next_terms(state, step, references)
+                terms = self._next_terms(state, step, inputs)
                 own = build_planner_inputs(self._config, step, inputs.tick, state.own, references)
                 state = replace(state, terms=terms, inputs=own)
                 return state, _Request((step, 0), own, terms), unusual
             unusual = (WINDOW_GAP, *unusual)
         if off == 0 and 1 <= exchange <= exchanges:
-            return state, self._answer(state, (step, exchange), references), unusual
+            return state, self._answer(state, (step, exchange), inputs), unusual
         if (inputs.plans or inputs.measurements) and self._has_all(state, (step, exchanges)):
             # All that the coming step needs of the peers is there: off the critical path.
-            state = replace(state, terms=self._next_terms(state, step + 1, references))
+            state = replace(state, terms=self._next_terms(state, step + 1, inputs))
         return state, None, unusual
 
-    def _next_terms(
-        self, state: LocalState, step: int, references: tuple[Reference, ...]
-    ) -> PeerTerms:
+    def _next_terms(self, state: LocalState, step: int, inputs: PlanningInputs) -> PeerTerms:
         """The peers' terms of a planning step, made of what they sent up to the step before."""
         if state.terms.steps[0] == step:
             return state.terms
-        end = step if brings_forward(self._config) else step - 1
-        selection = self._neighbours.select(
-            state.peers, step - 1, self._first(state), window_step=end
-        )
+        first, end = self._first(inputs.mode), step if brings_forward(self._config) else step - 1
+        selection = self._neighbours.select(state.peers, step - 1, first, window_step=end)
         # The base of samples to come is the command of now, whenever this is computed.
         now = (step - 1) * self._step_ms
-        base = base_of_window(self._config, end * self._step_ms, references, now)
-        return self._planner.peer_terms(state.terms, selection, step, base)
+        base = base_of_window(self._config, end * self._step_ms, inputs.references, now)
+        return self._planner.peer_terms(selection, step, base)
 
     def _answer(
-        self, state: LocalState, serial: tuple[int, int], references: tuple[Reference, ...]
+        self, state: LocalState, serial: tuple[int, int], inputs: PlanningInputs
     ) -> _Request | None:
         """Plan the present step again with the peers' plans of it; skipped if some are late."""
         (step, exchange), own = serial, state.inputs
         if own is None or own.step != step or not self._has_all(state, (step, exchange - 1)):
             return None
-        selection = self._neighbours.select(state.peers, step, self._first(state))
-        base = base_of_window(self._config, step * self._step_ms, references)
-        terms = self._planner.peer_terms(state.terms, selection, step, base)
-        return _Request(serial, own, terms)
+        selection = self._neighbours.select(state.peers, step, self._first(inputs.mode))
+        base = base_of_window(self._config, step * self._step_ms, inputs.references)
+        return _Request(serial, own, self._planner.peer_terms(selection, step, base))
 
-    def _first(self, state: LocalState) -> int:
+    def _first(self, mode: Mode) -> int:
         """The first planning step: the team's, or that of a robot which began to walk later."""
-        return max(self._first_step, -(-state.begun // self._step_ms))
+        return max(self._first_step, -(-mode.since // self._step_ms))
 
     def _has_all(self, state: LocalState, serial: tuple[int, int]) -> bool:
         return self._neighbours.is_complete(state.peers, serial)
@@ -227,14 +217,14 @@ class LocalPlanning:
             result.u - (1.0 - share) * result.du,
             result.y_nominal + share * (result.y - result.y_nominal),
             FADED if faded else result.status,
-            result.used,
+            terms.used,
             exchange,
         )
         start, behind = tick + self._config.planner.latency_ms, 0 if exchange else 1  # steps
         outputs = PlanningOutputs(
             plan,
             ActivePlan(start, plan_tick, share * result.du, followed),
-            _peer_lost(result.lost) if result.lost else "",
+            _peer_lost(terms.lost) if terms.lost else "",
             took,
             {f"plan.{p}": float(self._step_ms * (behind + age)) for p, age in terms.ages.items()},
             unusual,

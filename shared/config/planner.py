@@ -116,7 +116,11 @@ class PlannerConfig:
         3, "planning steps", "a peer's plan older than this is no longer shifted", low=1, high=25
     )
     hold_steps: int = key(
-        5, "planning steps", "a lost peer's terms are held this long, then stop", low=0, high=250
+        5,
+        "planning steps",
+        "a silent peer counts as planning nothing this long, then stop",
+        low=0,
+        high=250,
     )
     peer_timeout: float = key(
         5.0, "s wall", "lockstep: longest wait for a peer's plan", low=0.01, high=10.0

@@ -56,15 +56,11 @@ def inputs_of(config: Config, step: int = STEP, **changes: Any) -> PlannerInputs
 
 
 def terms_of(
-    config: Config,
-    planner: Planner,
-    *peers: PeerData,
-    before: PeerTerms = NOTHING,
-    base: Array | None = None,
+    config: Config, planner: Planner, *peers: PeerData, base: Array | None = None
 ) -> PeerTerms:
     """Terms of the peers given, by default of one that did and plans nothing."""
     y_base = np.tile(BASE, (config.planner.T_ini, 1)) if base is None else base
-    return planner.peer_terms(before, PeerSelection(peers or (peer(config),)), STEP, y_base)
+    return planner.peer_terms(PeerSelection(peers or (peer(config),)), STEP, y_base)
 
 
 def plan(

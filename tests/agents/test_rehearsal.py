@@ -10,7 +10,7 @@ import pytest
 
 from quadriga.agents.agent import Agent
 from quadriga.agents.modes import WALK
-from quadriga.agents.planner import solver
+from quadriga.agents.planner.planner import Planner
 from quadriga.agents.rehearsal import rehearse
 from quadriga.shared.config.sections import Config, TeamConfig
 from tests.agents.counting import count_calls
@@ -35,11 +35,11 @@ print(len(first))
 
 def test_limits_of_both_qps_are_met(monkeypatch: pytest.MonkeyPatch) -> None:
     """Their first solve would otherwise load code in mid-walk: 40 ms."""
-    found = count_calls(monkeypatch, solver, "minimise")
+    found = count_calls(monkeypatch, Planner, "step")
     state = rehearse(ALONE, Agent(ALONE, "r1", simple_predictor(ALONE)))
     assert state.mode.name == WALK
     assert state.counters["qp_constrained"] > 0
-    assert max(minimum.solutions for minimum in found) > 0
+    assert max(result.iterations for _, result in found) > 0
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from quadriga.agents.gait import scheduled_stance
-from quadriga.agents.planner.peers import HELD, LOST, USABLE, Neighbours, PeerData, PeerMemory
+from quadriga.agents.planner.peers import LOST, SILENT, USABLE, Neighbours, PeerData, PeerMemory
 from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config
 from quadriga.shared.messages import Measurement, Plan
@@ -101,9 +101,9 @@ def test_at_step_k_the_plan_and_the_window_of_step_k_minus_1_are_used() -> None:
 
 
 @pytest.mark.parametrize(
-    ("age", "status"), [(0, USABLE), (1, USABLE), (2, USABLE), (3, HELD), (5, HELD), (6, LOST)]
+    ("age", "status"), [(0, USABLE), (1, USABLE), (2, USABLE), (3, SILENT), (5, SILENT), (6, LOST)]
 )
-def test_a_missing_plan_is_replaced_by_the_newest_one_shifted_then_the_peer_is_held_then_lost(
+def test_a_missing_plan_is_replaced_by_the_newest_one_shifted_then_the_peer_is_silent_then_lost(
     age: int, status: str
 ) -> None:
     newest = 19 - age
@@ -113,9 +113,9 @@ def test_a_missing_plan_is_replaced_by_the_newest_one_shifted_then_the_peer_is_h
     assert (peer.status, peer.step, peer.age) == (status, newest, age)
     if status == USABLE:
         np.testing.assert_allclose(peer.du, expected_du(20, age), atol=1e-9)
-    selection = NEIGHBOURS.select(memory, 19, 20)  # r3 has no first plan to be late with
-    lost = ("r2",) if status == LOST else ()
-    assert (selection.lost, NEIGHBOURS.lost_peers(memory, 19, 20)) == (lost, lost)
+    selection = NEIGHBOURS.select(memory, 19, FIRST)
+    assert selection.lost == NEIGHBOURS.lost_peers(memory, 19, FIRST)
+    assert ("r2" in selection.lost) == (status == LOST)
 
 
 def test_the_first_planning_step_needs_nobodys_plan() -> None:
@@ -131,7 +131,7 @@ def test_the_first_planning_step_needs_nobodys_plan() -> None:
 def test_a_peer_that_never_plans_is_lost_in_the_end() -> None:
     memory = NEIGHBOURS.initial()
     seen = [of(memory, step).status for step in range(FIRST, FIRST + 7)]
-    assert seen == [USABLE] * 3 + [HELD] * 3 + [LOST]
+    assert seen == [USABLE] * 3 + [SILENT] * 3 + [LOST]
 
 
 @pytest.mark.parametrize(
@@ -262,7 +262,7 @@ def test_loss_repetition_and_reordering(
     newest = max(usable, default=FIRST - 1)
     age = step - 1 - newest
     limits = (PLANNER.max_peer_age, PLANNER.max_peer_age + PLANNER.hold_steps)
-    assert peer.status == (USABLE, HELD, LOST)[sum(age > limit for limit in limits)]
+    assert peer.status == (USABLE, SILENT, LOST)[sum(age > limit for limit in limits)]
     if peer.status != USABLE:
         return
     assert peer.step == (newest if usable else None)
@@ -319,3 +319,10 @@ def test_complete_means_every_peer_s_plan_and_the_samples_before_it() -> None:
     assert not NEIGHBOURS.is_complete(both, (20, 0))
     without = NEIGHBOURS.remember(memory, 780, r3[:-1], [("r3", plan("r3", 19))])
     assert not NEIGHBOURS.is_complete(without, (19, 0))
+
+
+def test_plans_of_before_a_stop_do_not_count() -> None:
+    memory = remember(20, [12, 13], window_ticks(20))
+    peer = NEIGHBOURS.select(memory, 19, 20).peers[0]
+    assert (peer.status, peer.step, peer.age) == (USABLE, None, 0)
+    assert not peer.du.any()

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy import optimize
 
 from quadriga.agents.planner.qp import PlannerProblem, residuals, unpack
-from quadriga.agents.planner.solver import SOLVED, SOLVERS, Solver, judge
+from quadriga.agents.planner.solver import SOLVED, SOLVERS, DaqpSolver, judge
 from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config, PlannerConfig
 from quadriga.shared.robots.conventions import Array
@@ -39,7 +39,7 @@ def problem_of(seed: int, step: int = 20, planner: PlannerConfig = PLANNER) -> P
     return build_problem(planner, response(seed), stance_of(step))
 
 
-def solver_of(problem: PlannerProblem, name: str = "daqp") -> Solver:
+def solver_of(problem: PlannerProblem, name: str = "daqp") -> DaqpSolver:
     return SOLVERS[name](problem)
 
 

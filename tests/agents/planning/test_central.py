@@ -89,18 +89,6 @@ def test_the_order_of_arrival_does_not_matter_and_strangers_do_not_count() -> No
     assert len(results) == 1
 
 
-def test_the_clock_is_only_told() -> None:
-    ticking = iter(range(0, 1000, 7))
-    timed = Central(
-        CONFIG, build_centralised(CONFIG, simple_predictor(CONFIG)), lambda: next(ticking)
-    )
-    _, outputs = timed.step(heard(320))
-    _, untimed = CENTRAL.step(heard(320))
-    assert (outputs.planner_ns, untimed.planner_ns) == (7, 0)
-    assert outputs.plans[0][1].u.tobytes() == untimed.plans[0][1].u.tobytes()
-    assert replace(outputs, planner_ns=0).plans[0][1].used == untimed.plans[0][1].used
-
-
 def test_a_rehearsal_plans_two_steps_of_standing() -> None:
     planned: list[int] = []
 
