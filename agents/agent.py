@@ -18,11 +18,11 @@ from quadriga.agents.counters import count
 from quadriga.agents.estimator.estimator import estimate, truth_row
 from quadriga.agents.estimator.robot_state import RobotState, Schedule, gains_row
 from quadriga.agents.modes import ModeRules, Resume, Statuses, newest_statuses, ramp
-from quadriga.agents.planner.qp_solver import SolvedQp
-from quadriga.agents.planner.team_planner import Collected
+from quadriga.agents.planner.solver import SolvedQp
+from quadriga.agents.planner.team import Collected
 from quadriga.agents.planning.active_plan import setpoint_at
 from quadriga.agents.planning.interface import Expected, PlanningInputs
-from quadriga.agents.planning.operator_references import reference_at, remember_references
+from quadriga.agents.planning.references import reference_at, remember_references
 from quadriga.agents.planning.registry import PlanningState, build_planning
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.schedules import Schedules

@@ -8,10 +8,10 @@ from typing import Final
 
 import numpy as np
 
-from quadriga.agents.planner.qp_solver import SOLVED
-from quadriga.agents.planner.team_planner import TeamPlanner
+from quadriga.agents.planner.solver import SOLVED
+from quadriga.agents.planner.team import TeamPlanner
+from quadriga.agents.planning.central import Central, CentralOutputs, CentralState
 from quadriga.agents.planning.interface import REFUSED
-from quadriga.agents.planning.team import Central, CentralOutputs, CentralState
 from quadriga.agents.plausibility import is_within_limits
 from quadriga.agents.rehearsal import rehearse_central
 from quadriga.agents.time_grid import step_ms
@@ -145,7 +145,6 @@ class _CentralShell:
             self._put[name](encode(plan))
         if not outputs.plans or outputs.planner_ns is None:
             return
-        self._counters.update(outputs.unusual)
         plan = outputs.plans[0][1]
         if plan.status != SOLVED:
             self._counters[f"plan_{code_of(plan.status)}"] += 1

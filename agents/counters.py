@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from quadriga.agents.controller.whole_body_qp import UNCONSTRAINED, WholeBodySolution
-from quadriga.agents.planner.qp_solver import SOLVED
+from quadriga.agents.planner.solver import SOLVED
 from quadriga.agents.planning.interface import PlanningOutputs
 from quadriga.agents.validate import Validated
 from quadriga.shared.codes import code_of

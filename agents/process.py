@@ -7,7 +7,7 @@ from typing import Final
 
 from quadriga.agents.agent import Agent
 from quadriga.agents.inbox.inbox import Inbox
-from quadriga.agents.planner.team_planner import Collected
+from quadriga.agents.planner.team import Collected
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.predictor.store import predictor_sha256
 from quadriga.agents.rehearsal import rehearse

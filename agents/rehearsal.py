@@ -12,7 +12,7 @@ import numpy as np
 
 from quadriga.agents.agent import Agent, AgentState, Inputs
 from quadriga.agents.gait import nominal_forces, scheduled_stance
-from quadriga.agents.planning.team import Central, CentralState
+from quadriga.agents.planning.central import Central, CentralState
 from quadriga.agents.time_grid import first_step, step_ms
 from quadriga.agents.validate import AGREES_MS, standing_torques
 from quadriga.shared.codec import decode, encode

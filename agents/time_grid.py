@@ -70,10 +70,10 @@ def first_step(config: Config, begun: int = 0) -> int:
     return -(-ready_ms // step_ms(config))
 
 
-def owed_from(config: Config, since: int) -> int:
-    """The step from which on a robot owes plans and is owed them, which walks since a tick.
+def first_due_step(config: Config, since: int) -> int:
+    """The first step at which plans of and for a robot are due that has walked since a tick.
 
-    Who begins in the midst of a walk owes and is owed nothing till its window is whole.
+    Of one that begins in the midst of a walk none is due before its window is whole.
     """
     first = first_step(config)
     return max(first, first_step(config, since)) if since > config.gait.stand_ms else first

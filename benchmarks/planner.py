@@ -40,7 +40,7 @@ from benchmarks.planner_contenders import (
 )
 from benchmarks.planner_peer import AVAILABLE, CvxpyDeepc
 from benchmarks.planner_ticks import PlanningTick, record
-from quadriga.agents.planner.planner_qp import PlannerProblem
+from quadriga.agents.planner.qp import PlannerProblem
 from quadriga.agents.predictor.gates import load_checked
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.identification.predictors import ensure_data, ensure_predictor

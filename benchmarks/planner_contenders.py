@@ -10,18 +10,16 @@ import numpy as np
 
 from benchmarks.as_written import DeepcQp, PaperQp
 from benchmarks.planner_ticks import PlanningTick
-from quadriga.agents.planner.deepc_qp import build_model, select
-from quadriga.agents.planner.peer_terms import PeerTerms
 from quadriga.agents.planner.planner import Planner
-from quadriga.agents.planner.planner_qp import (
+from quadriga.agents.planner.qp import (
     PlannerProblem,
     build_problem,
     constrain,
     stance_columns,
     unpack,
 )
-from quadriga.agents.planner.qp_solver import SOLVERS, Solver
-from quadriga.agents.planner.team_planner import TeamPlanner, build_centralised
+from quadriga.agents.planner.solver import SOLVERS, DaqpSolver
+from quadriga.agents.planner.team import TeamPlanner, build_centralised, build_model, select
 from quadriga.agents.predictor.episode import Episode, team_layout
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.predictor.regression import reduce
@@ -88,7 +86,7 @@ class Local:
         self._G_past = [np.ascontiguousarray(predictor.block(i, i)[:, :past]) for i in robots]
         self._planners = [Planner(config, i, predictor) for i in robots]
         self._problems: dict[tuple[int, bytes], PlannerProblem] = {}
-        self._solvers: dict[tuple[str, int, bytes], Solver] = {}
+        self._solvers: dict[tuple[str, int, bytes], DaqpSolver] = {}
 
     def cases(self, tick: PlanningTick) -> list[Case]:
         """The plans of one step; also makes the set-up that all ticks share."""
@@ -137,7 +135,7 @@ class Local:
         def run(case: Case) -> Array:
             (i,), problem = case.robots, case.problem
             solver = self._solvers[name, i, case.tick.stance[i].tobytes()]
-            solution = solver.solve(problem.gradient @ (case.y_free - case.y_des))
+            solution = solver.solve(problem.condensed.F_des @ (case.y_des - case.y_free))
             return unpack(problem, solution.x, case.y_free)[0].ravel()
 
         return run
@@ -145,7 +143,7 @@ class Local:
     def _whole_tick(self, case: Case) -> Array:
         (i,), tick = case.robots, case.tick
         planner, inputs = self._planners[i], tick.inputs[i]
-        terms = planner.peer_terms(PeerTerms(), tick.selections[i], inputs.step, tick.base_before)
+        terms = planner.peer_terms(tick.selections[i], inputs.step, tick.base_before)
         return planner.step(planner.initial(), inputs, terms)[1].du.ravel()
 
     def _free(self, tick: PlanningTick, i: int) -> Array:
@@ -202,7 +200,7 @@ class TeamDeepc:
         planner = config.planner
         self._config, self._episodes = config, episodes
         reduction = reduce(episodes, team_layout(config.team.robots, planner.T_ini, planner.N))
-        self._model = build_model(reduction, planner, planner.lambda_g, planner.lambda_sigma)
+        self._model = build_model(reduction, planner)
         self._set_up = cache(self._build)
 
     def cases(self, tick: PlanningTick) -> list[Case]:
@@ -231,7 +229,7 @@ class TeamDeepc:
 
         return [Contender("eq. 5", AS_WRITTEN, as_written), Contender("eq. 5", "daqp", ours)]
 
-    def _build(self, stance: bytes) -> tuple[PlannerProblem, Solver]:
+    def _build(self, stance: bytes) -> tuple[PlannerProblem, DaqpSolver]:
         pattern = np.frombuffer(stance, dtype=np.bool_).reshape(-1, 4)
         condensed = select(self._model, stance_columns(pattern))
         problem = constrain(self._config.planner, self._config.robot.weight, condensed, pattern)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadriga.agents.gait import nominal_forces
-from quadriga.agents.planner.neighbours import FRESH, PeerData, PeerSelection
+from quadriga.agents.planner.peers import USABLE, PeerData, PeerSelection
 from quadriga.agents.planner.planner import PlannerInputs
 from quadriga.agents.predictor.episode import commanded_outputs, output_base
 from quadriga.agents.predictor.predictor import Predictor
@@ -85,7 +85,7 @@ def _tick(
             PeerData(
                 robot=f"r{j + 1}",
                 index=j,
-                status=FRESH,
+                status=USABLE,
                 step=step - 1,
                 age=0,
                 known=np.ones(config.planner.T_ini, dtype=np.bool_),

@@ -17,7 +17,6 @@ _UNKEPT: Final = (
     "the agents are compiled anew, for a minute or two: no folder for machine code can be written "
     "to, or its disk is full; set NUMBA_CACHE_DIR or XDG_CACHE_HOME to one with room"
 )
-_PULL: Final = 1e6  # of the planner's cost on each force: the best forces are beyond their limits
 
 
 def warm_up(config: Config, console: Console) -> None:
@@ -53,11 +52,8 @@ def _is_compiled(folder: Path | None) -> bool:
 def _rehearse_agent(config: Config) -> None:
     """Everything that an agent with a peer does, with a predictor that predicts nothing."""
     from quadriga.agents.agent import Agent
-    from quadriga.agents.planner.planner_qp import build_problem
-    from quadriga.agents.planner.qp_solver import SOLVERS
     from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
     from quadriga.agents.rehearsal import rehearse
-    from quadriga.agents.time_grid import first_step, horizon_stance
     from quadriga.shared.robots.conventions import N_OUTPUTS
 
     planner = replace(config.planner, kind="distributed", exchanges=0)
@@ -65,7 +61,3 @@ def _rehearse_agent(config: Config) -> None:
     meta = PredictorMeta.of(pair)
     nothing = np.zeros((meta.phases, _ROBOTS, _ROBOTS, N_OUTPUTS * meta.N, meta.width))
     rehearse(pair, Agent(pair, "r1", Predictor(meta, nothing)))
-    # What predicts nothing never asks for forces beyond their limits.
-    stance = horizon_stance(pair, 0, first_step(pair))
-    problem = build_problem(planner, pair.robot.weight, nothing[0, 0, 0, :, meta.past :], stance)
-    SOLVERS[planner.solver](problem).solve(np.full(len(problem.H), _PULL))

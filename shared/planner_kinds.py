@@ -23,9 +23,9 @@ from quadriga.shared.errors import ConfigError, did_you_mean
 GROUP: Final = "quadriga.planners"
 NO_PLANNER: Final = "none"  # the kind without plans
 # What agents do of every kind that is one process for the team: they follow its plans.
-FOLLOW: Final = "quadriga.agents.planning.remote:build_remote"
+FOLLOW: Final = "quadriga.agents.planning.remote:RemotePlanning"
 _LOCAL: Final = "quadriga.agents.planning.local:LocalPlanning"
-_CENTRAL: Final = "quadriga.agents.planner.team_planner"
+_CENTRAL: Final = "quadriga.agents.planner.team"
 _KEY: Final = "planner.kind"
 
 
@@ -78,36 +78,38 @@ class PlannerKind:
         return self.needs_predictor and not self.central
 
 
-_KINDS: Final = (
-    PlannerKind(
-        "distributed",
-        "each agent plans with its peers' last plans (eq. 12)",
-        _LOCAL,
-        needs_peers=True,
-    ),
-    PlannerKind("decentralised", "without its peers", _LOCAL),
-    PlannerKind(
-        "centralised",
-        "one process plans for all (eq. 7)",
-        FOLLOW,
-        f"{_CENTRAL}:build_centralised_team",
-    ),
-    PlannerKind(
-        "deepc",
-        "one process plans for all (eq. 5)",
-        FOLLOW,
-        f"{_CENTRAL}:build_deepc_team",
-        needs_data=True,
-    ),
-    PlannerKind(
-        NO_PLANNER,
-        "nominal forces",
-        "quadriga.agents.planning.nominal:build_nominal",
-        needs_predictor=False,
-        publishes=False,
-    ),
-)
-BUILT_IN: Final[Mapping[str, PlannerKind]] = {kind.name: kind for kind in _KINDS}
+BUILT_IN: Final[Mapping[str, PlannerKind]] = {
+    kind.name: kind
+    for kind in (
+        PlannerKind(
+            "distributed",
+            "each agent plans with its peers' last plans (eq. 12)",
+            _LOCAL,
+            needs_peers=True,
+        ),
+        PlannerKind("decentralised", "without its peers", _LOCAL),
+        PlannerKind(
+            "centralised",
+            "one process plans for all (eq. 7)",
+            FOLLOW,
+            f"{_CENTRAL}:build_centralised",
+        ),
+        PlannerKind(
+            "deepc",
+            "one process plans for all (eq. 5)",
+            FOLLOW,
+            f"{_CENTRAL}:build_deepc",
+            needs_data=True,
+        ),
+        PlannerKind(
+            NO_PLANNER,
+            "nominal forces",
+            "quadriga.agents.planning.registry:NominalPlanning",
+            needs_predictor=False,
+            publishes=False,
+        ),
+    )
+}
 
 
 def find_kind(name: str) -> PlannerKind:

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from quadriga.agents import gait, rehearsal
 from quadriga.agents.estimator import estimator, kinematics
 from quadriga.agents.estimator.robot_state import RobotState, gains_row
-from quadriga.agents.planner import planner_qp
-from quadriga.agents.planner.planner_qp import PlannerProblem
+from quadriga.agents.planner import qp
+from quadriga.agents.planner.qp import PlannerProblem
 from quadriga.shared.config.sections import Config, PlannerConfig
 from quadriga.shared.messages import State
 from quadriga.shared.robots import pinocchio_model
@@ -60,5 +60,5 @@ def build_pinocchio_model() -> pin.Model:
 def build_problem(
     config: PlannerConfig, G_u: Array, stance: NDArray[np.bool_], G_past: Array | None = None
 ) -> PlannerProblem:
-    """See `planner_qp.build_problem`."""
-    return planner_qp.build_problem(config, WEIGHT, G_u, stance, G_past)
+    """See `qp.build_problem`."""
+    return qp.build_problem(config, WEIGHT, G_u, stance, G_past)

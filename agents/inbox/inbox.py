@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 from quadriga.agents.planning.interface import NOTHING, Expected
-from quadriga.agents.planning.operator_references import AHEAD_MS
-from quadriga.agents.planning.reference_slew import ReferenceSlew
+from quadriga.agents.planning.references import AHEAD_MS
 from quadriga.agents.plausibility import (
     is_measurable,
     is_orientation,
@@ -102,7 +101,6 @@ class Inbox:
         self._most = _HELD + config.gait.stand_ms // SAMPLE_MS
         self._step_ms = step_ms(config)
         self._newest_state = -1  # its tick
-        self._slew = ReferenceSlew(config)
         self._measurable = measured_limits(config.robot)
         is_measurable(self._measurable, self._measurable)  # compiled, or loaded, now
         self._state: State | None = None
@@ -224,7 +222,7 @@ class Inbox:
             state,
             tuple(measurements),
             tuple(plans),
-            tuple(self._slew.limit(reference) for _, reference in references),
+            tuple(reference for _, reference in references),
             requests.get(ESTOP),
             truths[-1][1] if truths else None,
             stop=requests.get(STOP),

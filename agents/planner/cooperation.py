@@ -1,7 +1,8 @@
-"""Cooperative planning: each agent minimises the cost of the whole team over its own forces.
+"""Plans that answer each other, and how their iteration converges.
 
-With z_l = [u_ini; y_ini; u] of robot l and e the commanded less the base outputs, which the team's
-robots have in common, the team's cost is
+With the cost "team" each agent minimises the cost of the whole team over its own forces. With
+z_l = [u_ini; y_ini; u] of robot l and e the commanded less the base outputs, which the team's
+robots have in common, that is
 
     V(u_1 … u_n) = Σ_j ½‖Σ_l G_jl z_l − e‖²_Q̄ + ½‖u_j‖²_R̄.
 
@@ -25,9 +26,9 @@ each agent's bounds are its own, so the limit is the optimum of eq. 7.
 
 What an agent has measured since its last plan its peers do not know yet, so nobody else reacts to
 it. Before it counts as the last plan, u_i is therefore moved by the agent's best reaction to that
-news, the difference δ between its window and the one that its last plan predicted:
+innovation, the difference δ between its window and the one that its last plan predicted:
 −D_i⁻¹ Σ_j G_jiᵀ Q̄ G_ji,past δ. Only what all know is answered with the share w. In an iteration on
-the same windows there is no news, and nothing of the above changes.
+the same windows there is no innovation, and nothing of the above changes.
 """
 
 from __future__ import annotations
@@ -42,7 +43,13 @@ from numpy.typing import NDArray
 from scipy import linalg
 from scipy.sparse.linalg import eigsh
 
-from quadriga.agents.planner.planner_qp import Condensed, PlannerProblem, constrain, stance_columns
+from quadriga.agents.planner.qp import (
+    NO_BOUNDS,
+    Condensed,
+    PlannerProblem,
+    constrain,
+    stance_columns,
+)
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.time_grid import distinct_steps, horizon_stance, phase_of
 from quadriga.shared.config.sections import Config
@@ -52,6 +59,9 @@ from quadriga.shared.robots.conventions import N_OUTPUTS, Array
 OWN: Final = "own"  # values of planner.cost
 TEAM: Final = "team"
 _TOLERANCE: Final = 1e-6  # of the eigenvalues
+_BY_SIZE: Final = -1.0  # value of planner.damping
+_FREE: Final = {"usual": 3}  # robots whose plans converge undamped, by planner.preset
+_FREE_ELSE: Final = 2
 
 
 def is_cooperative(config: Config) -> bool:
@@ -74,12 +84,19 @@ def brings_forward(config: Config) -> bool:
     return config.planner.compensation or is_cooperative(config)
 
 
-def relevant_peers(predictor: Predictor, index: int) -> frozenset[int]:
-    """Robots whose forces matter to an output that those of robot `index` matter to."""
-    n = predictor.meta.robots
-    acts = np.array([[predictor.couples(j, i) for i in range(n)] for j in range(n)])
-    reached = acts[acts[:, index]].any(axis=0)
-    return frozenset(np.flatnonzero(reached).tolist()) - {index}
+def coupled_peers(config: Config, index: int, predictor: Predictor) -> frozenset[int]:
+    """Robots whose plans matter to agent `index`: those whose forces move its outputs.
+
+    With the team's cost also those whose forces move an output that its own forces move.
+    """
+    if not find_kind(config.planner.kind).needs_peers:
+        return frozenset()
+    robots = range(config.team.robots)
+    if predictor.meta.neighbours == "all":
+        return frozenset(robots) - {index}
+    moves = np.array([[predictor.couples(j, i) for i in robots] for j in robots])
+    moved = moves[:, index] if is_cooperative(config) else np.arange(len(robots)) == index
+    return frozenset(np.flatnonzero(moves[moved].any(axis=0)).tolist()) - {index}
 
 
 def team_slope(
@@ -186,7 +203,9 @@ def eigenvalue_range(H: Array, sizes: Sequence[int]) -> tuple[float, float]:
     return float(least), float(most)
 
 
-def stay_near_last(problem: PlannerProblem, f: Array, w: float, last: Array, news: Array) -> Array:
+def stay_near_last(
+    problem: PlannerProblem, f: Array, w: float, last: Array, innovation: Array
+) -> Array:
     """The linear term of w times the QP that stays near the last plan; its Hessian is that of V.
 
     Args:
@@ -194,10 +213,10 @@ def stay_near_last(problem: PlannerProblem, f: Array, w: float, last: Array, new
         f: linear term of V by own stance forces, (nv,).
         w: share of the new plan.
         last: the last plan's deviations of these forces, (nv,), N.
-        news: δ, window less the one that the last plan predicted, (18 T_ini,).
+        innovation: δ, window less the one that the last plan predicted, (18 T_ini,).
     """
     condensed = problem.condensed
-    return w * f + (1.0 - w) * (condensed.F_past @ news - condensed.H @ last)
+    return w * f + (1.0 - w) * (condensed.F_past @ innovation - condensed.H @ last)
 
 
 def new_plan_share(config: Config, predictor: Predictor) -> float:
@@ -235,11 +254,7 @@ class _Same:
 
 
 def _eigenvalue_ranges(config: Config, predictor: Predictor) -> tuple[tuple[float, float], ...]:
-    """Of each distinct planning step.
-
-    Remembered, which changes no result: the agents of a walk in one process have the same, and so
-    do the next walk's.
-    """
+    """Of each distinct planning step; a memo: the agents in one process ask for the same."""
     free = replace(config, world=Config().world, planner=replace(config.planner, damping=0.0))
     return _compute_ranges(free, _Same(predictor))
 
@@ -256,3 +271,32 @@ def _choose_share(config: Config, ranges: Sequence[tuple[float, float]]) -> floa
     if config.planner.damping > 0.0:
         return 1.0 - config.planner.damping
     return min(1.0, *(2.0 / (least + most) for least, most in ranges))
+
+
+# ---- damping of best responses, with the own cost
+
+
+def kept_share(config: Config) -> float:
+    """d, the share of its own last plan that an agent's best response keeps.
+
+    If the size of the team chooses it: where n robots act on each other alike, with effects c of
+    their own, the undamped map has the eigenvalues c and −c (n − 1). Keeping d, the largest in size
+    is least at d = c (n − 2) / (2 + c (n − 2)), with c = 1/2 at (n − 2) / (n + 2). The gate on the
+    radius tells whether that is enough. Few robots converge without and are not damped.
+    """
+    planner, n = config.planner, config.team.robots
+    if planner.output_bounds != NO_BOUNDS:  # a last plan may break them by now
+        return 0.0
+    if planner.damping != _BY_SIZE:
+        return planner.damping
+    return 0.0 if n <= _FREE.get(planner.preset, _FREE_ELSE) else (n - 2) / (n + 2)
+
+
+def kept_by_agent(config: Config) -> float:
+    """`kept_share` of an agent of the configured kind.
+
+    One that plans as if it were alone answers nobody: no iteration is there to be damped, and the
+    size of the team is nothing to it.
+    """
+    answers, by_size = find_kind(config.planner.kind).needs_peers, config.planner.damping < 0.0
+    return 0.0 if by_size and not answers else kept_share(config)

@@ -20,8 +20,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quadriga.agents.planner.optimality import largest_residuals
-from quadriga.agents.planner.row_solve import solve, subtract
+from quadriga.agents.planner.qp import is_optimal, largest_residuals
 from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.jit import compiled
 
@@ -66,14 +65,14 @@ class _Faces(NamedTuple):
     value: Array
 
 
-class WithinLimits(NamedTuple):
+class Minimum(NamedTuple):
     """A minimiser and its proof.
 
     Attributes:
         v: forces, (nv,), N.
         multipliers: of [v; A v], positive for upper bounds.
-        stationarity, primal, complementarity: see `Residuals`.
-        solutions: how many QPs on faces it took; `FAILED`: no minimiser was found.
+        stationarity, primal, complementarity: see `Residuals`; 0 of −H⁻¹ f.
+        solutions: how many QPs on faces it took, 0 of −H⁻¹ f; `FAILED`: no minimiser was found.
     """
 
     v: Array
@@ -84,53 +83,49 @@ class WithinLimits(NamedTuple):
     solutions: int
 
 
-def has_foot_limits(lower: Array, upper: Array, slope: float) -> bool:
-    """Whether bounds, see `ForceQp`, are such limits of feet, and leave each foot some force."""
-    nv = 3 * (len(lower) // 7)
-    z, side = slice(2, nv, 3), upper[nv::4]
-    return bool(
-        slope > 0.0
-        and (upper[:nv] >= lower[:nv]).all()
-        and (lower[:nv][0::3] == -upper[:nv][0::3]).all()
-        and (lower[:nv][1::3] == -upper[:nv][1::3]).all()
-        and (side + slope * lower[z] >= 0.0).all()
-    )
+def has_foot_limits(qp: ForceQp) -> bool:
+    """Whether its bounds are such limits of feet, and leave each foot some force."""
+    nv, low, high = len(qp.H), qp.lower[: len(qp.H)], qp.upper[: len(qp.H)]
+    if 3 * len(qp.upper) != 7 * nv or not (high >= low).all():
+        return False
+    sideways = (low[0::3] == -high[0::3]).all() and (low[1::3] == -high[1::3]).all()
+    return bool(sideways and (qp.upper[nv::4] + qp.slope * low[2::3] >= 0.0).all())
 
 
 @compiled
-def minimise_freely(qp: ForceQp, f: Array) -> tuple[Array, bool]:
-    """The minimiser without limits, and whether it keeps them."""
-    _, minus_inverse, lower, upper, slope = qp
-    x = minus_inverse @ f
-    inside = True
-    for i in range(len(x)):
-        inside = inside and lower[i] <= x[i] <= upper[i]
-    for foot in range(len(x) // 3):
-        limit = upper[len(x) + 4 * foot] + slope * x[3 * foot + 2]
-        inside = inside and abs(x[3 * foot]) <= limit and abs(x[3 * foot + 1]) <= limit
-    return x, inside
-
-
-@compiled
-def minimise_within(qp: ForceQp, f: Array, free: Array) -> WithinLimits:
-    """The minimiser within the feet's limits, for a finite f.
+def minimise(qp: ForceQp, f: Array) -> Minimum:
+    """The minimiser: −H⁻¹ f if that keeps the limits, else by Newton's method.
 
     Args:
         qp: what does not depend on f.
         f: linear term, (nv,).
-        free: −H⁻¹ f, the minimiser without limits.
     """
+    # Unpacked before the loops: each access to a tuple in a loop costs a reference count.
     H, minus_inverse, lower, upper, slope = qp
     nv = len(f)
+    free = minus_inverse @ f
+    inside = True
+    for i in range(nv):
+        inside = inside and lower[i] <= free[i] <= upper[i]
+    for foot in range(nv // 3):
+        limit = upper[nv + 4 * foot] + slope * free[3 * foot + 2]
+        inside = inside and abs(free[3 * foot]) <= limit and abs(free[3 * foot + 1]) <= limit
+    nothing = np.zeros(len(upper))
+    if inside:
+        return Minimum(free, nothing, 0.0, 0.0, 0.0, 0)
+    solutions = _MOST if np.isfinite(np.dot(f, f)) else 0
     metric = np.empty(nv)
     for i in range(nv):
         metric[i] = -_STEP * minus_inverse[i, i]
     faces = _Faces(np.zeros(nv), np.zeros(nv, dtype=np.bool_), np.zeros(nv))
     v, gradient = free, np.zeros(nv)
-    for solutions in range(_MOST):
+    for solution in range(solutions):
         off = _project(v, gradient, metric, lower, upper, slope, faces)
         if off <= _CLOSE:
-            return _with_proof(H, f, v, lower, upper, slope, faces, solutions)
+            found = _with_proof(H, f, v, lower, upper, slope, faces, solution)
+            if is_optimal(found.primal, found.stationarity):
+                return found
+            break
         count = 0
         for i in range(nv):
             count += faces.fixed[i]
@@ -140,8 +135,7 @@ def minimise_within(qp: ForceQp, f: Array, free: Array) -> WithinLimits:
             v, gradient = _move_along(H, f, faces, nv - count)
         if not np.isfinite(v.sum()):
             break
-    nothing = np.zeros(nv)
-    return WithinLimits(nothing, np.zeros(len(upper)), np.inf, np.inf, np.inf, FAILED)
+    return Minimum(np.zeros(nv), nothing, np.inf, np.inf, np.inf, FAILED)
 
 
 @compiled
@@ -247,7 +241,7 @@ def _pull_back(minus_inverse: Array, free: Array, faces: _Faces, count: int) -> 
             k += 1
     # The rows are the negative normals, and so is the inverse: their product is positive definite.
     gram = _gram(minus_inverse, rows, places, -1.0)
-    solve(gram, off)
+    _solve(gram, off)
     gradient = np.zeros(nv)
     for k in range(count):
         for axis in range(3):
@@ -279,7 +273,7 @@ def _move_along(H: Array, f: Array, faces: _Faces, count: int) -> tuple[Array, A
                     rows[k, j] = tilt[foot + j]
                     w[k] -= tilt[foot + j] * gradient[foot + j]
             k += 1
-    solve(_gram(H, rows, places, 1.0), w)
+    _solve(_gram(H, rows, places, 1.0), w)
     moved = np.zeros(nv)
     for k in range(count):
         for axis in range(3):
@@ -297,7 +291,7 @@ def _gram(K: Array, rows: Array, places: NDArray[np.int64], sign: float) -> Arra
         for axis in range(3):
             if rows[a, axis] != 0.0:
                 begin = places[a]
-                subtract(row[begin:], -sign * rows[a, axis], K[begin + axis, begin:])
+                _subtract(row[begin:], -sign * rows[a, axis], K[begin + axis, begin:])
         for b in range(a, count):
             at = places[b]
             gram[a, b] = rows[b, 0] * row[at] + rows[b, 1] * row[at + 1] + rows[b, 2] * row[at + 2]
@@ -314,7 +308,7 @@ def _with_proof(
     slope: float,
     faces: _Faces,
     solutions: int,
-) -> WithinLimits:
+) -> Minimum:
     """The minimiser v on its faces with the multipliers that hold it there, and their residuals."""
     nv = len(f)
     Hv = H @ v
@@ -348,4 +342,42 @@ def _with_proof(
             values[row + 2 * axis] = v[i + axis] - slope * v[i + 2]
             values[row + 2 * axis + 1] = -v[i + axis] - slope * v[i + 2]
     figures = largest_residuals(Hv, f, pull, values, multipliers, lower, upper)
-    return WithinLimits(v, multipliers, figures[0], figures[1], figures[2], solutions)
+    return Minimum(v, multipliers, figures[0], figures[1], figures[2], solutions)
+
+
+@compiled
+def _solve(S: Array, x: Array) -> None:
+    """Replace x, (k,), by S⁻¹ x, and the upper triangle of S, (k, k), by its factor U, S = Uᵀ U.
+
+    NaN where S is not positive definite. Whole rows are added up, several elements at a time, in
+    an order that no processor changes.
+    """
+    count = len(x)
+    for b in range(count):
+        row = S[b, b:]
+        fours = b - b % 4
+        for a in range(0, fours, 4):  # the row is loaded and stored once for four
+            row0, row1, row2, row3 = S[a, b:], S[a + 1, b:], S[a + 2, b:], S[a + 3, b:]
+            s0, s1, s2, s3 = row0[0], row1[0], row2[0], row3[0]
+            for j in range(len(row)):
+                row[j] -= s0 * row0[j] + s1 * row1[j] + s2 * row2[j] + s3 * row3[j]
+        for a in range(fours, b):
+            _subtract(row, S[a, b], S[a, b:])
+        pivot = np.sqrt(row[0]) if row[0] > 0.0 else np.nan
+        for j in range(len(row)):
+            row[j] /= pivot
+        x[b] /= pivot
+        _subtract(x[b + 1 :], x[b], row[1:])
+    for b in range(count - 1, -1, -1):
+        rest, row = x[b + 1 :], S[b, b + 1 :]
+        total = x[b]
+        for j in range(len(rest)):
+            total -= row[j] * rest[j]
+        x[b] = total / S[b, b]
+
+
+@compiled
+def _subtract(row: Array, factor: float, other: Array) -> None:
+    """Subtract factor · other. Shapes (k,)."""
+    for j in range(len(row)):
+        row[j] -= factor * other[j]

@@ -2,43 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quadriga.agents.gait import nominal_forces, nominal_table
-from quadriga.agents.planner.compiled_step import CompiledStep, OwnWindow, past_deviations
 from quadriga.agents.planner.cooperation import (
     build_team_problem,
     is_cooperative,
+    kept_by_agent,
     new_plan_share,
     stay_near_last,
 )
-from quadriga.agents.planner.damping import kept_by_agent
-from quadriga.agents.planner.neighbours import PeerSelection
-from quadriga.agents.planner.optimality import Residuals
+from quadriga.agents.planner.foot_limits import FAILED, ForceQp, minimise
 from quadriga.agents.planner.peer_terms import Peers, PeerTerms
-from quadriga.agents.planner.planner_qp import PlannerProblem, build_problem, unpack
-from quadriga.agents.planner.qp_solver import (
+from quadriga.agents.planner.peers import PeerSelection
+from quadriga.agents.planner.qp import PlannerProblem, Residuals, build_problem, unpack
+from quadriga.agents.planner.solver import (
     NOMINAL,
     SOLVED,
     SOLVERS,
+    DaqpSolver,
     SolvedQp,
-    Solver,
     no_solution,
 )
-from quadriga.agents.plausibility import are_plausible_outputs
+from quadriga.agents.plausibility import OUTPUT_MAX, are_plausible_outputs
 from quadriga.agents.predictor.predictor import Predictor, check_sizes
 from quadriga.agents.time_grid import horizon_stance, phase_of, place_in, walking_steps
 from quadriga.shared.codes import with_detail
 from quadriga.shared.config.sections import Config
 from quadriga.shared.modes import PEER_LOST
-from quadriga.shared.robots.conventions import Array
+from quadriga.shared.robots.conventions import N_FORCES, N_OUTPUTS, Array
+from quadriga.shared.runtime.jit import compiled
 from quadriga.shared.runtime.record import record
 
 IMPLAUSIBLE: Final = "implausible"
+_Planned = tuple[Array, Array, Array, Array, tuple[float, float, float], int]
 
 
 @record
@@ -65,16 +65,14 @@ class PlannerInputs:
     y_des: Array
     weight: float
 
-    def window(self) -> OwnWindow:
-        """The same for the compiled step."""
-        return OwnWindow(
-            self.u_ini, self.y_ini, self.stance_ini, self.y_base_ini, self.y_base, self.y_des
-        )
-
     def past(self) -> Array:
         """Deviations [u_ini; y_ini]. Shape (18 T_ini,)."""
         du = self.u_ini - nominal_forces(self.stance_ini, self.weight)
         return np.concatenate([du.ravel(), (self.y_ini - self.y_base_ini).ravel()])
+
+    def wanted(self) -> Array:
+        """Deviations y_des from the base. Shape (6 N,)."""
+        return (self.y_des - self.y_base).ravel()
 
 
 @record
@@ -104,9 +102,7 @@ class PlanResult:
         u: forces, swing legs exactly zero, (N, 12), N.
         du: their deviation from nominal, (N, 12), N.
         y: predicted outputs under u, (N, 6); the desired ones where the prediction is implausible.
-        y_nominal: predicted outputs under nominal forces, for a plan that is faded, (N, 6).
-        used: step of the plan used, by peer.
-        lost: peers given up; the agent stops if there are any.
+        y_nominal: predicted outputs under nominal forces, as of a plan not applied, (N, 6).
         residuals: optimality of the QP's solution.
         iterations: of the QP solver.
     """
@@ -116,23 +112,28 @@ class PlanResult:
     du: Array
     y: Array
     y_nominal: Array
-    used: Mapping[str, int]
-    lost: tuple[str, ...]
     residuals: Residuals
     iterations: int
 
 
+class _Prediction(NamedTuple):
+    """See `Condensed`, `PlannerProblem`; nominal forces by stance pattern, (16, 12), N."""
+
+    Y_past: Array
+    Y_v: Array
+    F_des: Array
+    columns: NDArray[np.int64]
+    nominal: Array  # forces of the horizon, (N, 12), N
+    nominal_table: Array
+
+
 @record
 class _Setup:
-    """Set-up of one step of the gait's cycle; nominal forces of the horizon, (N, 12), N.
-
-    `none` are no deviations of the QP's forces, (nv,), N.
-    """
+    """Set-up of one step of the gait's cycle; no deviation of the QP's forces, (nv,), N."""
 
     problem: PlannerProblem
-    solver: Solver
-    nominal: Array
-    compiled: CompiledStep | None
+    solver: DaqpSolver
+    prediction: _Prediction
     none: Array
 
 
@@ -153,7 +154,7 @@ class Planner:
         self._config, self._index, self._predictor = config, index, predictor
         self._cycle, self._peers = walking_steps(config), Peers(config, index, predictor)
         self._cooperative = is_cooperative(config)
-        self._kept = kept_by_agent(config)
+        self._kept = 0.0 if self._cooperative else kept_by_agent(config)
         self._new_share = new_plan_share(config, predictor) if self._cooperative else 1.0
         # Memo of the set-ups, one for each step of the gait's cycle; it changes no result.
         self._setups: dict[int, _Setup] = {}
@@ -164,11 +165,9 @@ class Planner:
         """No plan made yet."""
         return PlannerState()
 
-    def peer_terms(
-        self, before: PeerTerms, selection: PeerSelection, step: int, y_base: Array
-    ) -> PeerTerms:
+    def peer_terms(self, selection: PeerSelection, step: int, y_base: Array) -> PeerTerms:
         """See `Peers.terms`."""
-        return self._peers.terms(before, selection, step, y_base)
+        return self._peers.terms(selection, step, y_base)
 
     def step(
         self, state: PlannerState, inputs: PlannerInputs, peers: PeerTerms
@@ -181,13 +180,15 @@ class Planner:
             peers: the peers' terms of eq. 11.
         """
         setup = self._setup(inputs.step)
-        if setup.compiled is not None and not peers.lost:
-            result = self._plan_compiled(setup, setup.compiled, state, inputs, peers)
-            if result is not None:
-                return PlannerState(inputs.step, result.du, result.y, state.solves + 1), result
-        # Any number may be measured; one that overflows shows in the result.
-        with np.errstate(over="ignore", invalid="ignore"):
-            return self._plan_by_solver(setup, state, inputs, peers)
+        forces, outputs, y_free, f, proof, solutions = self._plan(setup, state, inputs, peers)
+        if solutions == FAILED:
+            result = self._fall_back(setup, state, inputs, peers, y_free, f)
+        else:
+            residuals = Residuals(*proof) if solutions else setup.solver.exact
+            plan = forces[0], forces[1], outputs[0], outputs[1]
+            result = PlanResult(SOLVED, *plan, residuals, solutions)
+        solves = state.solves + (not peers.lost)
+        return PlannerState(inputs.step, result.du, result.y, solves), result
 
     def problem_of(
         self, state: PlannerState, inputs: PlannerInputs, peers: PeerTerms
@@ -196,121 +197,87 @@ class Planner:
         if peers.lost:
             return None
         setup = self._setup(inputs.step)
+        _, _, y_free, f, _, _ = self._plan(setup, state, inputs, peers)
         with np.errstate(over="ignore", invalid="ignore"):
-            return self._solve(setup, state, inputs, peers, _free_response(setup, inputs, peers))
+            error = y_free - inputs.wanted()
+            solution = setup.solver.solve(f, error)
+        return SolvedQp(setup.problem, f, *setup.problem.bounds(error), solution)
 
-    def _plan_compiled(
-        self,
-        setup: _Setup,
-        step: CompiledStep,
-        state: PlannerState,
-        inputs: PlannerInputs,
-        peers: PeerTerms,
-    ) -> PlanResult | None:
-        """The plan unless a solver or a fallback has to make it."""
-        last = self._last(setup.problem, state, inputs.step) if self._kept else setup.none
-        plan = step.plan(inputs.window(), peers.effect, last)
-        if plan is None:
-            return None
-        u, du, y, y_nominal, residuals, iterations = plan
-        return PlanResult(
-            SOLVED, u, du, y, y_nominal, peers.used, peers.lost, residuals, iterations
-        )
-
-    def _plan_by_solver(
+    def _plan(
         self, setup: _Setup, state: PlannerState, inputs: PlannerInputs, peers: PeerTerms
-    ) -> tuple[PlannerState, PlanResult]:
-        """The plan by a solver, or the fallback where there is none."""
-        problem = setup.problem
-        y_free = _free_response(setup, inputs, peers)
-        if peers.lost:
-            solution, solves = no_solution(problem, PEER_LOST), 0
-            x = solution.x
-        else:
-            solved, solves = self._solve(setup, state, inputs, peers, y_free), 1
-            solution = solved.solution
-            x = self._mix_with_last(solved, state, inputs.step)
-        status = solution.status
-        du, dy = unpack(problem, x, y_free)
-        y, y_nominal = inputs.y_base + dy, inputs.y_base + y_free.reshape(dy.shape)
-        if not (are_plausible_outputs(y) and are_plausible_outputs(y_nominal)):
-            # The outputs cannot be predicted: nominal forces, and the desired outputs as a guess.
-            du, y, y_nominal = np.zeros_like(du), inputs.y_des, inputs.y_des
-            status = IMPLAUSIBLE if status == SOLVED else status
-        result = PlanResult(
-            status=SOLVED if status == SOLVED else with_detail(NOMINAL, status),
-            u=setup.nominal + du,
-            du=du,
-            y=y,
-            y_nominal=y_nominal,
-            used=peers.used,
-            lost=peers.lost,
-            residuals=solution.residuals,
-            iterations=solution.iterations,
+    ) -> _Planned:
+        """See `_plan_step`."""
+        problem, f, last, effect = setup.problem, setup.none[:0], setup.none, peers.effect
+        if self._cooperative or self._kept:
+            last = self._last(problem, state, inputs.step)
+        # Any number may be measured; one that overflows shows in the result.
+        if self._cooperative:
+            with np.errstate(over="ignore", invalid="ignore"):
+                past = inputs.past()
+                f = problem.linear_term(past, inputs.wanted()) + peers.slope
+                innovation = self._innovation(past, state, inputs)
+                f = stay_near_last(problem, f, self._new_share, last, innovation)
+        if not isinstance(effect, np.ndarray):  # one type: machine code is made for each
+            effect = np.full(len(setup.prediction.Y_past), effect)
+        window = inputs.u_ini, inputs.y_ini, inputs.stance_ini, inputs.y_base_ini
+        return _plan_step(
+            (*window, inputs.y_base, inputs.y_des),
+            effect,
+            f,
+            (self._kept, last),
+            setup.prediction,
+            setup.solver.force_qp,
+            setup.solver.limits_feet and not peers.lost,
         )
-        return PlannerState(inputs.step, du, y, state.solves + solves), result
 
-    def _solve(
+    @np.errstate(over="ignore", invalid="ignore")
+    def _fall_back(
         self,
         setup: _Setup,
         state: PlannerState,
         inputs: PlannerInputs,
         peers: PeerTerms,
         y_free: Array,
-    ) -> SolvedQp:
-        """Solve the QP of a step with this free response of the agent's own outputs."""
-        problem, y_des = setup.problem, (inputs.y_des - inputs.y_base).ravel()
-        error = y_free - y_des
-        if self._cooperative:
-            f = problem.linear_term(inputs.past(), y_des) + peers.slope
-            last, news = self._last(problem, state, inputs.step), self._news(state, inputs)
-            f = stay_near_last(problem, f, self._new_share, last, news)
+        f: Array,
+    ) -> PlanResult:
+        """The plan by a solver, or nominal forces where there is none."""
+        problem = setup.problem
+        if peers.lost:
+            solution = no_solution(problem, PEER_LOST)
         else:
-            f = problem.gradient @ error
-        lower, upper = problem.bounds(error)
-        solution = setup.solver.solve(f, lower, upper)
-        return SolvedQp(
-            problem,
-            f,
-            problem.lower if lower is None else lower,
-            problem.upper if upper is None else upper,
-            solution,
-        )
-
-    def _mix_with_last(self, solved: SolvedQp, state: PlannerState, step: int) -> Array:
-        """Mix a best response with a share of the last plan, which is nominal beyond its end.
-
-        Both satisfy the constraints on forces; these are convex, so the mixture satisfies them too.
-        A last plan that would break bounds on outputs by now is not kept.
-        """
-        problem, x = solved.problem, solved.solution.x
-        if not self._kept or self._cooperative or solved.solution.status != SOLVED:
-            return x
-        share, last = self._kept, self._last(problem, state, step)
-        if not problem.keeps_outputs(last, solved.lower, solved.upper):
-            return x
-        mixed: Array = (1.0 - share) * x + share * last
-        return mixed
+            solution = setup.solver.solve(f, y_free - inputs.wanted())
+        x, status = solution.x, solution.status
+        if self._kept and status == SOLVED:
+            x = (1.0 - self._kept) * x + self._kept * self._last(problem, state, inputs.step)
+        du, dy = unpack(problem, x, y_free)
+        y, y_nominal = inputs.y_base + dy, inputs.y_base + y_free.reshape(dy.shape)
+        if not (are_plausible_outputs(y) and are_plausible_outputs(y_nominal)):
+            # The outputs cannot be predicted: nominal forces, and the desired outputs as a guess.
+            du, y, y_nominal = np.zeros_like(du), inputs.y_des, inputs.y_des
+            status = IMPLAUSIBLE if status == SOLVED else status
+        status = SOLVED if status == SOLVED else with_detail(NOMINAL, status)
+        u = setup.prediction.nominal + du
+        return PlanResult(status, u, du, y, y_nominal, solution.residuals, solution.iterations)
 
     def _last(self, problem: PlannerProblem, state: PlannerState, step: int) -> Array:
         """The last plan's deviations of the QP's forces, brought forward to a step. (nv,), N."""
         skipped = self._config.planner.applied * (step - state.step)
-        last = np.zeros((self._config.planner.N, 12))
+        last = np.zeros((self._config.planner.N, N_FORCES))
         if state.du is not None and 0 <= skipped < len(last):
             last[: len(last) - skipped] = state.du[skipped:]
         return last.ravel()[problem.columns]
 
-    def _news(self, state: PlannerState, inputs: PlannerInputs) -> Array:
+    def _innovation(self, past: Array, state: PlannerState, inputs: PlannerInputs) -> Array:
         """Past deviations less those that the last plan predicted; zero where it predicted none."""
         T_ini, since = len(inputs.u_ini), self._config.planner.applied * (inputs.step - state.step)
-        news = inputs.past()
+        innovation = np.zeros_like(past)
         if state.du is None or state.y is None or not 0 <= since <= T_ini:
-            return np.zeros_like(news)
-        u, y = news[: 12 * T_ini].reshape(T_ini, 12), news[12 * T_ini :].reshape(T_ini, 6)
-        u[: T_ini - since] = y[: T_ini - since] = 0.0
-        u[T_ini - since :] -= state.du[:since]
+            return innovation
+        u, y = (part.reshape(T_ini, -1) for part in np.split(innovation, [N_FORCES * T_ini]))
+        du_ini = past[: N_FORCES * T_ini].reshape(T_ini, -1)
+        u[T_ini - since :] = du_ini[T_ini - since :] - state.du[:since]
         y[T_ini - since :] = inputs.y_ini[T_ini - since :] - state.y[:since]
-        return news
+        return innovation
 
     def _setup(self, step: int) -> _Setup:
         """The set-up of a step of the gait's cycle, from the memo."""
@@ -321,26 +288,78 @@ class Planner:
         return setup
 
     def _build_setup(self, step: int) -> _Setup:
-        past, weight = self._predictor.meta.past, self._config.robot.weight
-        stance = horizon_stance(self._config, self._index, step)
+        config, index, past = self._config, self._index, self._predictor.meta.past
+        stance, weight = horizon_stance(config, index, step), config.robot.weight
         if self._cooperative:
-            problem = build_team_problem(self._config, self._predictor, self._index, step)
+            problem = build_team_problem(config, self._predictor, index, step)
         else:
-            phase = phase_of(self._config, step, self._predictor.phases)
-            G_ii = self._predictor.block(self._index, self._index, phase)
-            problem = build_problem(
-                self._config.planner, weight, G_ii[:, past:], stance, G_ii[:, :past]
-            )
-        solver = SOLVERS[self._config.planner.solver](problem)
-        nominal = nominal_forces(stance, weight)
-        qp, table = None if self._cooperative else solver.compiled, nominal_table(weight)
-        made = None if qp is None else CompiledStep(problem, qp, nominal, table, self._kept)
-        return _Setup(problem, solver, nominal, made, np.zeros(len(problem.columns)))
+            phase = phase_of(config, step, self._predictor.phases)
+            G = self._predictor.block(index, index, phase)
+            problem = build_problem(config.planner, weight, G[:, past:], stance, G[:, :past])
+        solver = SOLVERS[config.planner.solver](problem)
+        condensed, nominal = problem.condensed, nominal_forces(stance, weight)
+        matrices = condensed.Y_past, condensed.Y_v, condensed.F_des
+        prediction = _Prediction(*matrices, problem.columns, nominal, nominal_table(weight))
+        return _Setup(problem, solver, prediction, np.zeros(len(problem.columns)))
 
 
-def _free_response(setup: _Setup, inputs: PlannerInputs, peers: PeerTerms) -> Array:
-    """Output deviations under nominal forces, y_free of eq. 11. Shape (6 N,)."""
-    table = nominal_table(inputs.weight)
-    past = past_deviations(inputs.u_ini, inputs.y_ini, inputs.stance_ini, inputs.y_base_ini, table)
-    y_free: Array = setup.problem.condensed.Y_past @ past + peers.effect
-    return y_free
+@compiled
+def _plan_step(
+    own: tuple[Array, Array, NDArray[np.bool_], Array, Array, Array],
+    effect: Array,
+    f: Array,
+    last: tuple[float, Array],
+    prediction: _Prediction,
+    qp: ForceQp,
+    limits_feet: bool,
+) -> _Planned:
+    """Build, solve and unpack the QP of a step, in one call; without the fallback.
+
+    The caches are lost between two steps: it takes mostly the time to load its code and data.
+
+    Args:
+        own: u_ini, y_ini, stance_ini, y_base_ini, y_base and y_des, see `PlannerInputs`.
+        effect: of the peers on own outputs, (6 N,).
+        f: linear term of the team's cost, (nv,); empty: that of the own cost.
+        last: share of the last plan that is kept; its forces, (nv,), N.
+        prediction: of the stance pattern.
+        qp: likewise.
+        limits_feet: whether `qp` is all of the QP, which then is solved here.
+
+    Returns:
+        u and du, (2, N, 12), y and y_nominal, (2, N, 6), see `PlanResult`; the free response y_free
+        of eq. 11, (6 N,); f; residuals and number of solutions of the QP's `Minimum`.
+    """
+    # Unpacked before the loops: each access to a tuple in a loop costs a reference count.
+    u_ini, y_ini, stance_ini, y_base_ini, y_base, y_des = own
+    Y_past, Y_v, F_des, columns, nominal, nominal_table = prediction
+    (kept, x_last), T_ini, N = last, len(u_ini), len(y_des)
+    past = np.empty(T_ini * (N_FORCES + N_OUTPUTS))
+    for k in range(T_ini):
+        pattern = 0
+        for leg in range(4):
+            pattern = 2 * pattern + stance_ini[k, leg]
+        past[N_FORCES * k : N_FORCES * (k + 1)] = u_ini[k] - nominal_table[pattern]
+        at = N_FORCES * T_ini + N_OUTPUTS * k
+        past[at : at + N_OUTPUTS] = y_ini[k] - y_base_ini[k]
+    y_free = Y_past @ past + effect
+    if not len(f):
+        f = F_des @ ((y_des - y_base).ravel() - y_free)
+    x, proof, solutions = x_last, (0.0, 0.0, 0.0), FAILED
+    if limits_feet:
+        found = minimise(qp, f)
+        x, solutions = found.v, found.solutions
+        proof = found.stationarity, found.primal, found.complementarity
+    if kept:
+        x = (1.0 - kept) * x + kept * x_last
+    forces, outputs = np.zeros((2, N, N_FORCES)), np.empty((2, N, N_OUTPUTS))
+    du = forces[1].ravel()
+    for i in range(len(columns)):
+        du[columns[i]] = x[i]
+    forces[0] = nominal + forces[1]
+    outputs[0] = y_base + (y_free + Y_v @ x).reshape(N, N_OUTPUTS)
+    outputs[1] = y_base + y_free.reshape(N, N_OUTPUTS)
+    for output in outputs.flat:
+        if not abs(output) <= OUTPUT_MAX:
+            solutions = FAILED
+    return forces, outputs, y_free, f, proof, solutions

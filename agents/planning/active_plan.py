@@ -1,20 +1,17 @@
-"""Plans in force: what each must keep to, and which of them is applied at a tick."""
+"""Plans in force: what each must keep to, how much of it is applied, and which at a tick."""
 
 from __future__ import annotations
 
-from dataclasses import field, replace
+from dataclasses import field
+from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
 
 from quadriga.agents.gait import nominal_forces, scheduled_stance
-from quadriga.agents.planner.qp_solver import NOMINAL
-from quadriga.agents.plausibility import OUTPUT_MAX
-from quadriga.agents.predictor.episode import commanded_outputs
 from quadriga.agents.time_grid import sample_starts, step_ms
-from quadriga.shared.codes import with_detail
-from quadriga.shared.config.sections import Config
-from quadriga.shared.messages import Plan, Reference
+from quadriga.shared.config.sections import Config, PlannerConfig
+from quadriga.shared.messages import Plan
 from quadriga.shared.robots.conventions import N_FORCES, N_LEGS, N_OUTPUTS, Array
 from quadriga.shared.runtime.record import record
 from quadriga.shared.topics import SAMPLE_MS
@@ -24,6 +21,7 @@ _NO_FORCE = np.zeros(12)
 # With forces far beyond it a single plan would drive all joints to their limits.
 _SHARE: Final = 1.5
 _MARGIN: Final = 1.0  # N
+FADED: Final = "faded"  # status of a plan that is applied in part
 FARTHEST: Final = 10.0  # m, m/s, rad, rad/s: no trunk gets there, whatever is predicted
 
 
@@ -61,9 +59,7 @@ _NO_SETPOINT = Setpoint()
 
 
 class PlanCheck:
-    """What every plan of a robot must keep to, whoever has made it; and what comes in its place.
-
-    Faults are told without figures that differ from plan to plan; "" is none.
+    """What every plan of a robot must keep to, whoever has made it.
 
     Args:
         config: the team's configuration.
@@ -75,7 +71,6 @@ class PlanCheck:
         self._most = _SHARE * np.tile(config.planner.deviation_max, N_LEGS) + _MARGIN  # (12,), N
         # Nominal forces by the gait's phase: a memo, it changes no result.
         self._nominal: dict[int, Array] = {}
-        self.counter = f"refused_plan_of_{config.planner.kind}"
 
     def nominal(self, plan_tick: int) -> Array:
         """Nominal forces of the N samples from a tick on. Shape (N, 12), N."""
@@ -87,42 +82,36 @@ class PlanCheck:
             self._nominal[phase] = nominal_forces(stance, self._config.robot.weight)
         return self._nominal[phase]
 
-    def fault_of(self, plan: Plan, now: int, y_max: float = OUTPUT_MAX) -> str:
-        """Why a plan cannot be meant at a tick, with outputs up to a magnitude."""
+    def fault_of(self, plan: Plan, now: int) -> str:
+        """Why a plan cannot be meant at a tick; "": it can."""
         if plan.tick != plan.step * self._step_ms:
             return "a tick that is not that of its step"
-        return self._find_fault(now, plan.tick, plan.u, plan.y, y_max)
+        return self._find_fault(now, plan.tick, plan.u, plan.y)
 
     def fault_of_active(self, plan: ActivePlan, now: int) -> str:
         """The same of a plan that is to be applied."""
         if plan.start < now:
             return "a start that is over"
-        values = plan.deviation, plan.outputs
-        return self._find_fault(now, plan.plan_tick, *values, FARTHEST, deviation=True)
+        u, nominal = plan.deviation, self.nominal(plan.plan_tick)
+        u = nominal + u if np.shape(u) == nominal.shape else u
+        return self._find_fault(now, plan.plan_tick, u, plan.outputs)
 
-    def _find_fault(
-        self, now: int, plan_tick: int, u: Any, y: Any, y_max: float, *, deviation: bool = False
-    ) -> str:
-        """Of forces u, or what they deviate by from nominal, (N, 12), N, and outputs y, (N, 6)."""
+    def _find_fault(self, now: int, plan_tick: int, u: Any, y: Any) -> str:
+        """Of forces u, (N, 12), N, and outputs y, (N, 6). It has no figures, which would vary."""
         N = self._config.planner.N
         for name, values, width in (("forces", u, N_FORCES), ("outputs", y, N_OUTPUTS)):
-            if not isinstance(values, np.ndarray) or values.dtype != np.float64:
-                got = getattr(values, "dtype", type(values).__name__)
-                return f"{name} of type {got} instead of an array of float64"
-            if values.shape != (N, width):
-                got = "x".join(map(str, values.shape))
-                return f"{name} of shape {got} instead of {N}x{width}"
+            if getattr(values, "dtype", None) != np.float64 or values.shape != (N, width):
+                return f"{name} that are not an array of {N}x{width} float64"
             if not np.isfinite(values).all():
                 return f"{name} that are not finite"
         if not 0 <= now - plan_tick < SAMPLE_MS * N:
             return "samples of another time"
-        if np.abs(y).max() > y_max:
-            return f"outputs beyond {y_max:g} m or m/s or rad or rad/s"
+        if np.abs(y).max() > FARTHEST:
+            return f"outputs beyond {FARTHEST:g} m or m/s or rad or rad/s"
         nominal = self.nominal(plan_tick)
-        if (np.abs(u if deviation else u - nominal) > self._most).any():
+        if (np.abs(u - nominal) > self._most).any():
             return "forces that deviate by more than planner.deviation_max"
-        feet = (nominal + u if deviation else u).reshape(N, N_LEGS, 3)
-        swing = nominal.reshape(N, N_LEGS, 3)[..., 2] == 0.0
+        feet, swing = u.reshape(N, N_LEGS, 3), nominal[:, 2::3] == 0.0
         if np.abs(feet[swing]).max(initial=0.0) > _MARGIN:
             return "forces of a leg that swings"
         held = self._config.planner.mu * feet[..., 2] + _MARGIN
@@ -130,22 +119,25 @@ class PlanCheck:
             return "forces outside the friction cone of planner.mu"
         return ""
 
-    def replacement(self, plan: Plan, fault: str, now: int, reference: Reference) -> Plan:
-        """Nominal forces and desired outputs in the place of a plan that has a fault.
 
-        Args:
-            plan: what its planner has made.
-            fault: what is wrong with it.
-            now: tick within the planning step.
-            reference: in force.
-        """
-        step = now // self._step_ms
-        tick = step * self._step_ms
-        u = self.nominal(tick)
-        y = np.tile(commanded_outputs(reference), (len(u), 1))
-        status = with_detail(NOMINAL, f"plan of {self._config.planner.kind} refused: {fault}")
-        stamp_ns = tick * 1_000_000
-        return replace(plan, tick=tick, stamp_ns=stamp_ns, step=step, u=u, y=y, status=status)
+def trust_scaling(config: PlannerConfig, error: Array) -> float:
+    """Share of a plan to apply: 1 inside the range of the data, falling to 0 at twice that range.
+
+    An error that is no number is out of every range.
+
+    Args:
+        config: the range.
+        error: present outputs less the desired ones, shape (6,).
+    """
+    ranges = _ranges(config.trust_range)
+    share = 2.0 - float(np.maximum.reduce(np.abs(error) / ranges))
+    return min(1.0, share) if share > 0.0 else 0.0  # 0 if it is NaN
+
+
+@lru_cache
+def _ranges(trust_range: tuple[float, ...]) -> Array:
+    """Of the six outputs, (6,)."""
+    return np.array(trust_range)[[0, 1, 1, 2, 2, 3]]
 
 
 def add_plan(plans: tuple[ActivePlan, ...], new: ActivePlan) -> tuple[ActivePlan, ...]:

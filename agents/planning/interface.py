@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import field
 from typing import Final, Protocol, TypeVar
 
-from quadriga.agents.planner.qp_solver import SolvedQp
+from quadriga.agents.planner.solver import SolvedQp
 from quadriga.agents.planning.active_plan import ActivePlan
 from quadriga.shared.messages import Measurement, Plan, Reference
 from quadriga.shared.modes import Mode

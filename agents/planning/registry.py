@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -12,8 +12,8 @@ import numpy as np
 # what an agent's behaviour depends on finds these.
 import quadriga.agents.planning.local
 import quadriga.agents.planning.remote  # noqa: F401
-from quadriga.agents.planner.qp_solver import SolvedQp
-from quadriga.agents.planner.team_planner import Collected
+from quadriga.agents.planner.solver import NOMINAL, SolvedQp
+from quadriga.agents.planner.team import Collected
 from quadriga.agents.planning.active_plan import ActivePlan, PlanCheck, add_plan
 from quadriga.agents.planning.interface import (
     Expected,
@@ -21,16 +21,30 @@ from quadriga.agents.planning.interface import (
     PlanningInterface,
     PlanningOutputs,
 )
-from quadriga.agents.planning.nominal import NominalPlanning
-from quadriga.agents.planning.operator_references import reference_at
+from quadriga.agents.planning.references import reference_at
+from quadriga.agents.predictor.episode import commanded_outputs
 from quadriga.agents.predictor.predictor import Predictor
+from quadriga.agents.time_grid import step_ms
+from quadriga.shared.codes import with_detail
 from quadriga.shared.config.sections import Config
 from quadriga.shared.messages import Plan
 from quadriga.shared.modes import WALK
 from quadriga.shared.planner_kinds import find_kind, load_builder
 from quadriga.shared.runtime.record import record
 
-_NONE: Final = np.zeros((0, 0))
+
+class NominalPlanning(PlanningInterface[None]):
+    """No planning at all: the robot walks on nominal forces and follows the operator."""
+
+    def __init__(self, *_: object) -> None: ...
+
+    def initial(self) -> None:
+        """No state."""
+        return
+
+    def step(self, state: None, inputs: PlanningInputs) -> tuple[None, PlanningOutputs]:
+        """No deviation from nominal forces."""
+        return None, PlanningOutputs()
 
 
 @record
@@ -59,8 +73,7 @@ class CheckedPlanning(PlanningInterface[PlanningState]):
     """
 
     def __init__(self, config: Config, index: int, planner: PlanningInterface[Any]) -> None:
-        self._planner, self._check = planner, PlanCheck(config, index)
-        self._height = config.reference.height
+        self._config, self._planner, self._check = config, planner, PlanCheck(config, index)
 
     @property
     def peers(self) -> tuple[str, ...]:
@@ -107,13 +120,20 @@ class CheckedPlanning(PlanningInterface[PlanningState]):
         self, outputs: PlanningOutputs, inputs: PlanningInputs, fault: str
     ) -> PlanningOutputs:
         """Nominal forces from now on, published if the planner's plan was to be."""
-        tick, made = inputs.tick, outputs.plan or Plan(0, 0, 0, _NONE, _NONE, "", {}, 0)
-        reference, _ = reference_at(inputs.references, tick, self._height)
-        plan = self._check.replacement(made, fault, tick, reference)
-        active = ActivePlan(tick, plan.tick, np.zeros_like(plan.u), plan.y)
-        published = None if outputs.plan is None else plan
-        unusual = (*outputs.unusual, self._check.counter)
-        return replace(outputs, plan=published, active=active, unusual=unusual)
+        kind, step = self._config.planner.kind, inputs.tick // step_ms(self._config)
+        tick, height = step * step_ms(self._config), self._config.reference.height
+        u, reference = (
+            self._check.nominal(tick),
+            reference_at(inputs.references, inputs.tick, height)[0],
+        )
+        y = np.tile(commanded_outputs(reference), (len(u), 1))
+        plan = outputs.plan
+        if plan is not None:
+            status = with_detail(NOMINAL, f"plan of {kind} refused: {fault}")
+            plan = Plan(tick, tick * 1_000_000, step, u, y, status, plan.used, plan.exchange)
+        active = ActivePlan(inputs.tick, tick, np.zeros_like(u), y)
+        unusual = (*outputs.unusual, f"refused_plan_of_{kind}")
+        return replace(outputs, plan=plan, active=active, unusual=unusual)
 
 
 def build_planning(

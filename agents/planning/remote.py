@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
-from quadriga.agents.planning.active_plan import FARTHEST, ActivePlan, PlanCheck
-from quadriga.agents.planning.fade import FADED, fade_factor
+from quadriga.agents.planning.active_plan import FADED, ActivePlan, PlanCheck, trust_scaling
 from quadriga.agents.planning.interface import (
     NOTHING,
     REFUSED,
@@ -15,10 +13,9 @@ from quadriga.agents.planning.interface import (
     PlanningInterface,
     PlanningOutputs,
 )
-from quadriga.agents.planning.operator_references import reference_at
+from quadriga.agents.planning.references import reference_at
 from quadriga.agents.predictor.episode import commanded_outputs
-from quadriga.agents.predictor.predictor import Predictor
-from quadriga.agents.time_grid import first_step, owed_from, patience, step_ms
+from quadriga.agents.time_grid import first_due_step, first_step, patience, step_ms
 from quadriga.shared.config.sections import Config
 from quadriga.shared.messages import Measurement, Plan
 from quadriga.shared.modes import PLANNER_LOST, WALK
@@ -47,7 +44,7 @@ class RemotePlanning(PlanningInterface[RemoteState]):
         index: the agent's place in the team, 0-based.
     """
 
-    def __init__(self, config: Config, index: int) -> None:
+    def __init__(self, config: Config, index: int, *_: object) -> None:
         self._config, self._check = config, PlanCheck(config, index)
         self._step_ms, self._latency = step_ms(config), central_latency(config)
         self._first_step = first_step(config)
@@ -71,16 +68,16 @@ class RemotePlanning(PlanningInterface[RemoteState]):
             state = replace(state, newest_sample=inputs.measurement)
         unusual, active = list[str](), None
         for _, plan in inputs.plans:
-            if not self._is_usable(plan, tick):
+            if self._check.fault_of(plan, tick):  # of another team or time, or forged
                 unusual.append(REFUSED)
             elif state.newest < plan.serial:
-                state, active, factor = self._take(state, plan, inputs)
-                unusual += [f"plan_{FADED}"] if factor < 1.0 else []
+                state, active, share = self._follow(state, plan, inputs)
+                unusual += [f"plan_{FADED}"] if share < 1.0 else []
         if inputs.mode.name != WALK:
             return state, PlanningOutputs(unusual=tuple(unusual))
         newest_step = state.newest[0]
         due = (tick - self._latency) // self._step_ms
-        age = due - max(newest_step, owed_from(self._config, inputs.mode.since) - 1)
+        age = due - max(newest_step, first_due_step(self._config, inputs.mode.since) - 1)
         plan_tick = self._step_ms * newest_step
         return state, PlanningOutputs(
             active=active,
@@ -94,34 +91,23 @@ class RemotePlanning(PlanningInterface[RemoteState]):
         sample = state.newest_sample
         return sample is not None and tick - sample.tick < SAMPLE_MS
 
-    def _is_usable(self, plan: Plan, tick: int) -> bool:
-        """Whether a plan is one of this team's at this time: else it is foreign, or forged."""
-        return not self._check.fault_of(plan, tick, FARTHEST)
-
-    def _take(
+    def _follow(
         self, state: RemoteState, plan: Plan, inputs: PlanningInputs
     ) -> tuple[RemoteState, ActivePlan, float]:
         """Take a plan into force; with the share of it that is applied."""
-        factor, outputs = 1.0, plan.y
+        share, outputs = 1.0, plan.y
         if state.newest_sample is not None:
             now, _ = reference_at(inputs.references, inputs.tick, self._config.reference.height)
             y_des = commanded_outputs(now)
-            factor = fade_factor(self._config.planner, state.newest_sample.y - y_des)
+            share = trust_scaling(self._config.planner, state.newest_sample.y - y_des)
             # The plan does not tell the outputs without its forces: as it fades out, the desired
             # speeds take over.
-            outputs = y_des + factor * (plan.y - y_des)
+            outputs = y_des + share * (plan.y - y_des)
         du = plan.u - self._check.nominal(plan.tick)
-        active = ActivePlan(inputs.tick, plan.tick, factor * du, outputs)
-        return replace(state, newest=plan.serial), active, factor
+        active = ActivePlan(inputs.tick, plan.tick, share * du, outputs)
+        return replace(state, newest=plan.serial), active, share
 
 
 def central_latency(config: Config) -> int:
     """Ticks from the data of a central plan to its start; at least one for the way there."""
     return max(1, config.planner.latency_ms)
-
-
-def build_remote(
-    config: Config, index: int, _predictor: Predictor | None, _clock_ns: Callable[[], int]
-) -> RemotePlanning:
-    """The planning part of an agent of every kind that is one process for the team."""
-    return RemotePlanning(config, index)

@@ -23,9 +23,9 @@ from quadriga.agents.planner.cooperation import (
     cooperative_radius,
     cost_of,
     is_cooperative,
+    kept_share,
 )
-from quadriga.agents.planner.damping import kept_share
-from quadriga.agents.planner.planner_qp import PlannerProblem, build_problem
+from quadriga.agents.planner.qp import PlannerProblem, build_problem
 from quadriga.agents.predictor.episode import Episode
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.predictor.regression import scaled_blocks

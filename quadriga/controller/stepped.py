@@ -13,7 +13,7 @@ import numpy as np
 
 from quadriga.agents.modes import Resume, ramp
 from quadriga.agents.planning.interface import NOTHING, Expected
-from quadriga.agents.planning.operator_references import reference_at, remember_references
+from quadriga.agents.planning.references import reference_at, remember_references
 from quadriga.agents.step_io import Inputs, Outputs
 from quadriga.controller.motor_command import CAUSE
 from quadriga.plant.commands import damp_joints

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from quadriga.agents.planner.team_planner import Collected, TeamPlanner
+from quadriga.agents.planner.team import Collected, TeamPlanner
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.identification.cache import data_path
 from quadriga.identification.dataset import read_data

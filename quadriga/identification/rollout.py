@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from quadriga.agents.agent import Agent, AgentState, Inputs, Outputs
-from quadriga.agents.planner.team_planner import Collected, TeamPlanner
+from quadriga.agents.planner.team import Collected, TeamPlanner
+from quadriga.agents.planning.central import Central, CentralState
 from quadriga.agents.planning.remote import central_latency
-from quadriga.agents.planning.team import Central, CentralState
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.agent_command import KEY as CONTROLLER
 from quadriga.shared.config.sections import Config

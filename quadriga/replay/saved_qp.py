@@ -22,7 +22,7 @@ import daqp
 import numpy as np
 
 from quadriga.agents.agent import Agent, AgentState, Inputs, StepProblems
-from quadriga.agents.planner.qp_solver import SolvedQp
+from quadriga.agents.planner.solver import SolvedQp
 from quadriga.shared.errors import RecordingError, name_file_errors
 from quadriga.shared.robots.conventions import N_JOINTS, Array
 from quadriga.shared.runtime.npz import UNREADABLE, as_measured, open_npz

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from matplotlib.figure import Figure
 
-from quadriga.agents.planning.fade import FADED
+from quadriga.agents.planning.active_plan import FADED
 from quadriga.agents.time_grid import step_ms
 from quadriga.charts.colours import BARS, broad_style, robot_style
 from quadriga.charts.draw import draw_panels

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from quadriga.agents.planner.qp_solver import SOLVED
+from quadriga.agents.planner.solver import SOLVED
 from quadriga.recordings.traces import Traces
 from quadriga.recordings.truth import Ticks
 from quadriga.shared.codes import FALL, code_of

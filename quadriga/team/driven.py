@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from quadriga.agents.planning.reference_slew import most_change
 from quadriga.drive.controls import DriveControls, now_ms
 from quadriga.drive.steering import GO_ON, STOP, LastWord, steer
-from quadriga.drive.wish import NAMES, Wish, approach, standing
+from quadriga.drive.wish import Wish, approach, limits, standing
 from quadriga.shared.config.sections import Config
 from quadriga.shared.messages import Reference
 
 LOOK: Final = 0.02  # s, between two looks at who drives
+_SHARE: Final = 0.1  # of what may be asked for, the change in an epoch: all of it in a second
 
 
 class DrivenReferences:
@@ -28,9 +28,9 @@ class DrivenReferences:
         self._last = LastWord()
         self._rest = standing(config)
         self._wish: Wish = self._rest
-        self._most: Mapping[str, float] = dict(
-            zip(NAMES, most_change(config).tolist(), strict=True)
-        )
+        self._most: Mapping[str, float] = {
+            name: _SHARE * (high - low) for name, (low, high) in limits().items()
+        }
 
     def attend(self) -> None:
         """Look who drives; tell the team to stand, or to go on, if that has changed."""

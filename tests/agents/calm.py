@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from quadriga.agents.planner.neighbours import PeerData, PeerSelection
 from quadriga.agents.planner.peer_terms import PeerTerms
+from quadriga.agents.planner.peers import PeerData, PeerSelection
 from quadriga.agents.planner.planner import Planner, PlannerInputs, PlanResult
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config
@@ -27,7 +27,7 @@ def peer(config: Config, **changes: Any) -> PeerData:
     quiet = PeerData(
         robot="r2",
         index=1,
-        status="fresh",
+        status="usable",
         step=STEP - 1,
         age=0,
         known=np.ones(config.planner.T_ini, dtype=np.bool_),
@@ -56,15 +56,11 @@ def inputs_of(config: Config, step: int = STEP, **changes: Any) -> PlannerInputs
 
 
 def terms_of(
-    config: Config,
-    planner: Planner,
-    *peers: PeerData,
-    before: PeerTerms = NOTHING,
-    base: Array | None = None,
+    config: Config, planner: Planner, *peers: PeerData, base: Array | None = None
 ) -> PeerTerms:
     """Terms of the peers given, by default of one that did and plans nothing."""
     y_base = np.tile(BASE, (config.planner.T_ini, 1)) if base is None else base
-    return planner.peer_terms(before, PeerSelection(peers or (peer(config),)), STEP, y_base)
+    return planner.peer_terms(PeerSelection(peers or (peer(config),)), STEP, y_base)
 
 
 def plan(

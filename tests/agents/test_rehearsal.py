@@ -5,15 +5,15 @@ from __future__ import annotations
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from quadriga.agents.agent import Agent
-from quadriga.agents.planner.compiled_step import CompiledPlan, CompiledStep
+from quadriga.agents.planner.planner import Planner
 from quadriga.agents.rehearsal import rehearse
 from quadriga.shared.config.sections import Config, TeamConfig
 from quadriga.shared.modes import WALK
+from tests.agents.counting import count_calls
 from tests.agents.duet import simple_predictor
 
 ALONE = Config(team=TeamConfig(robots=1))
@@ -34,20 +34,11 @@ print(len(first))
 
 def test_limits_of_both_qps_are_met(monkeypatch: pytest.MonkeyPatch) -> None:
     """Their first solve would otherwise load code in mid-walk: 40 ms."""
-    iterations: list[int] = []
-    plan = CompiledStep.plan
-
-    def counting(*arguments: Any) -> CompiledPlan | None:
-        made = plan(*arguments)
-        assert made is not None
-        iterations.append(made.iterations)
-        return made
-
-    monkeypatch.setattr(CompiledStep, "plan", counting)
+    found = count_calls(monkeypatch, Planner, "step")
     state = rehearse(ALONE, Agent(ALONE, "r1", simple_predictor(ALONE)))
     assert state.mode.name == WALK
     assert state.counters["qp_constrained"] > 0
-    assert max(iterations) > 0
+    assert max(result.iterations for _, result in found) > 0
 
 
 @pytest.mark.parametrize(

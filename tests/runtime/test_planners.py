@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from quadriga.agents.planning.operator_references import AHEAD_MS
+from quadriga.agents.planning.references import AHEAD_MS
 from quadriga.agents.predictor.gates import load_checked as load_predictor
 from quadriga.agents.time_grid import first_step, step_ms
 from quadriga.identification.central_planner import build_central_planner

@@ -8,7 +8,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from quadriga.agents.agent import Agent
-from quadriga.agents.planner.team_planner import TeamPlanner
+from quadriga.agents.planner.team import TeamPlanner
 from quadriga.agents.predictor.gates import load_checked
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.experiments.trial.figures_of_merit import Figures, compute_figures

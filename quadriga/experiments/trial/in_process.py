@@ -11,7 +11,7 @@ import numpy as np
 
 from quadriga.agents.agent import Agent
 from quadriga.agents.planner.planner import PlannerInputs
-from quadriga.agents.planner.team_planner import Collected, TeamPlanner, TeamResult
+from quadriga.agents.planner.team import Collected, TeamPlanner, TeamResult
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.experiments.trial.figures_of_merit import Walk
 from quadriga.identification.rollout import Rollout, Tick, build_agents

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from quadriga.agents.planner.team_planner import TeamPlanner
+from quadriga.agents.planner.team import TeamPlanner
 from quadriga.agents.predictor.episode import U_SCALE, Y_SCALE
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.experiments.trial.figures_of_merit import Figures, compute_figures

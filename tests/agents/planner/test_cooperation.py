@@ -14,24 +14,26 @@ from scipy import linalg
 
 from quadriga.agents.planner.cooperation import (
     cooperative_radius,
+    coupled_peers,
     eigenvalue_range,
     is_cooperative,
+    kept_by_agent,
+    kept_share,
     new_plan_share,
-    relevant_peers,
     team_hessian,
 )
-from quadriga.agents.planner.neighbours import HELD, LOST, SHIFTED, PeerData, PeerSelection
-from quadriga.agents.planner.peer_terms import PeerTerms
+from quadriga.agents.planner.peers import PeerData, PeerSelection
 from quadriga.agents.planner.planner import Planner, PlannerInputs
-from quadriga.agents.planner.team_planner import build_centralised
+from quadriga.agents.planner.team import build_centralised
 from quadriga.agents.predictor.gates import are_same_costs, iteration_radius, probe_costs, run_gates
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.time_grid import horizon_stance, walking_steps
+from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
-from quadriga.shared.errors import PredictorError
+from quadriga.shared.errors import ConfigError, PredictorError
 from quadriga.shared.robots.conventions import Array
-from tests.a1 import WEIGHT, nominal_forces
-from tests.agents.calm import BASE, NOTHING, STEP, Team, inputs_of, peer, terms_of
+from tests.a1 import nominal_forces
+from tests.agents.calm import BASE, STEP, Team, inputs_of, peer, terms_of
 from tests.agents.conftest import fit_ridge
 
 ROUNDS = 200  # within which strongly coupled plans are as good as the central planner's
@@ -89,7 +91,7 @@ class Round:
         for i, planner in enumerate(self.planners):
             peers = tuple(self._data(j) for j in range(len(self.planners)) if j != i)
             base = self.inputs[i].y_base_ini
-            terms = planner.peer_terms(NOTHING, PeerSelection(peers, STEP), STEP, base)
+            terms = planner.peer_terms(PeerSelection(peers, STEP), STEP, base)
             self.states[i], result = planner.step(self.states[i], self.inputs[i], terms)
             assert result.status == "solved"
             new.append(result.du)
@@ -215,7 +217,7 @@ def test_the_slope_is_that_of_the_team_s_cost(small: Config, linear_team: Team) 
     at, planner = rounds.du, rounds.planners[1]
     peers = tuple(rounds._data(j) for j in (0, 2))
     base = rounds.inputs[1].y_base_ini
-    terms = planner.peer_terms(NOTHING, PeerSelection(peers, STEP), STEP, base)
+    terms = planner.peer_terms(PeerSelection(peers, STEP), STEP, base)
     qp = planner.problem_of(rounds.states[1], rounds.inputs[1], terms)
     assert qp is not None
     w = new_plan_share(config, rounds.predictor)
@@ -227,7 +229,7 @@ def test_the_slope_is_that_of_the_team_s_cost(small: Config, linear_team: Team) 
         assert slope[place] == pytest.approx(rise, rel=1e-4, abs=1e-4 * np.abs(slope).max())
 
 
-def test_news_is_answered_in_full_and_all_else_in_part(small: Config) -> None:
+def test_the_innovation_is_answered_in_full_and_all_else_in_part(small: Config) -> None:
     """One step after a plan: the same window as it predicted, and one that is off it."""
     config = cooperative(small)
     predictor = coupled(config, 4, 0.5)
@@ -251,8 +253,8 @@ def test_news_is_answered_in_full_and_all_else_in_part(small: Config) -> None:
     qp = planner.problem_of(state, expected, terms)
     assert qp is not None
     F_past, H = qp.problem.condensed.F_past, qp.problem.H
-    news = np.concatenate([np.zeros(12 * T_ini), off.ravel()])
-    answer = -np.linalg.solve(H, F_past @ news)
+    innovation = np.concatenate([np.zeros(12 * T_ini), off.ravel()])
+    answer = -np.linalg.solve(H, F_past @ innovation)
     moved = (surprised.du - calm.du).ravel()[qp.problem.columns]
     np.testing.assert_allclose(moved, answer, atol=1e-6)
     assert np.abs(answer).max() > 0.01
@@ -325,16 +327,17 @@ def test_those_matter_who_reach_a_neighbour(small: Config) -> None:
     for i in range(4):
         for j in range(4):
             G[:, i, j] *= abs(i - j) <= 1
-    predictor = Predictor(PredictorMeta.of(config), G)
-    assert [sorted(relevant_peers(predictor, i)) for i in range(4)] == [
-        [1, 2],
-        [0, 2, 3],
-        [0, 1, 3],
-        [1, 2],
-    ]
+    predictor = Predictor(replace(PredictorMeta.of(config), neighbours="yoked"), G)
+
+    def peers(asked: Config) -> list[list[int]]:
+        return [sorted(coupled_peers(asked, i, predictor)) for i in range(4)]
+
+    assert peers(config) == [[1, 2], [0, 2, 3], [0, 1, 3], [1, 2]]
+    assert peers(small_own(config)) == [[1], [0, 2], [1, 3], [2]]
+    assert peers(cooperative(small, robots=4, kind="decentralised")) == [[]] * 4
 
 
-def test_an_older_plan_counts_from_where_it_is_now_and_a_silent_peer_s_effect_is_held(
+def test_the_peers_terms_are_the_effect_of_their_plans_and_its_slope(
     small: Config, linear_team: Callable[..., Any]
 ) -> None:
     config = cooperative(small)
@@ -344,39 +347,55 @@ def test_an_older_plan_counts_from_where_it_is_now_and_a_silent_peer_s_effect_is
     base = np.tile(BASE, (small.planner.T_ini, 1))
     stance = np.repeat(horizon_stance(config, 1, STEP), 3, axis=1)
     pushing = np.where(stance, np.tile([20.0, 5.0, 0.0], (8, 4)), 0.0)
-    third = peer(config, robot="r3", index=2)
-
-    def terms(step: int, before: PeerTerms, *peers: PeerData) -> PeerTerms:
-        return planner.peer_terms(before, PeerSelection(peers, step), step, base)
-
-    fresh = terms(STEP, NOTHING, peer(config, du=pushing), third)
+    pair = peer(config, age=1, du=pushing), peer(config, robot="r3", index=2)
+    terms = planner.peer_terms(PeerSelection(pair, STEP), STEP, base)
     z = np.zeros((3, predictor.meta.width))
     z[1, predictor.meta.past :] = pushing.ravel()
     effect = predictor.predict(z)
+    qp = planner.problem_of(planner.initial(), inputs_of(config), terms)
+    assert qp is not None
+    columns, Q = qp.problem.columns, np.tile(config.planner.Q, config.planner.N)
+    blocks = [predictor.future_block(j, 0)[:, columns] for j in range(3)]
+    slope = sum(block.T @ (Q * effect[j]) for j, block in enumerate(blocks))
+    np.testing.assert_allclose(terms.effect, effect[0], atol=1e-6 * np.abs(effect).max())
+    np.testing.assert_allclose(terms.slope, slope, rtol=1e-4, atol=1e-4)
 
-    def slope_of(step: int) -> Array:
-        asked = terms(step, NOTHING, third)
-        problem = planner.problem_of(planner.initial(), inputs_of(config, step), asked)
-        assert problem is not None
-        columns, Q = problem.problem.columns, np.tile(config.planner.Q, config.planner.N)
-        total: Array = sum(
-            predictor.future_block(j, 0)[:, columns].T @ (Q * effect[j]) for j in range(3)
-        )
-        return total
 
-    np.testing.assert_allclose(fresh.effect, effect[0], atol=1e-6 * np.abs(effect).max())
-    np.testing.assert_allclose(fresh.slope, slope_of(STEP), rtol=1e-4, atol=1e-4)
-    shifted = terms(STEP, NOTHING, peer(config, status=SHIFTED, age=1, du=pushing), third)
-    np.testing.assert_array_equal(shifted.slope, fresh.slope)
-    now = fresh
-    for step in range(STEP + 1, STEP + 7):
-        silent = peer(config, status=HELD, step=STEP, age=step - STEP)
-        now = terms(step, now, silent, third)
-        np.testing.assert_allclose(now.effect, effect[0], atol=1e-6 * np.abs(effect).max())
-        expected = slope_of(step)
-        np.testing.assert_allclose(now.slope, expected, atol=1e-5 * np.abs(expected).max())
-    gone = terms(STEP + 7, now, peer(config, status=LOST, age=9), third)
-    state, result = planner.step(planner.initial(), inputs_of(config, STEP + 7), gone)
-    assert result.status == "nominal:peer-lost"
-    assert state.solves == 0
-    assert inputs_of(config).weight == WEIGHT
+# ---- damping of best responses
+
+
+def share(robots: int, **planner: object) -> float:
+    keys = {"team.robots": robots, **{f"planner.{k}": v for k, v in planner.items()}}
+    return kept_share(load(overrides=keys))
+
+
+@given(st.integers(3, 10))
+def test_it_is_the_fastest_for_robots_alike_with_half_their_own_effect_on_each_other(
+    n: int,
+) -> None:
+    """The map of n such robots is −c (1 1ᵀ − I); damped, its radius is least at this share."""
+    alike = -0.5 * (np.ones((n, n)) - np.eye(n))
+    eigenvalues = np.linalg.eigvalsh(alike)
+    candidates = np.linspace(0.0, 0.99, 991)
+    radii = [np.abs(d + (1.0 - d) * eigenvalues).max() for d in candidates]
+    best = candidates[int(np.argmin(radii))]
+    assert share(n, preset="fast") == pytest.approx(best, abs=1e-3)
+    assert min(radii) < 1.0
+
+
+def test_few_robots_are_damped_only_if_they_are_asked_to_be() -> None:
+    shares = {(1, "usual"): 0.0, (3, "usual"): 0.0, (4, "usual"): 1 / 3, (2, "fast"): 0.0,
+              (3, "fast"): 0.2, (10, "paper"): 0.0}  # fmt: skip
+    found = {key: share(key[0], preset=key[1]) for key in shares}
+    assert found == pytest.approx(shares)
+    assert (share(10, damping=0.0), share(2, damping=0.3)) == (0.0, 0.3)
+    with pytest.raises(ConfigError, match=r"planner.damping: got -0.5, expected -1, or 0 … 0.95"):
+        share(5, damping=-0.5)
+
+
+def test_who_answers_nobody_is_damped_only_if_it_is_asked_to() -> None:
+    kinds = ("distributed", "decentralised")
+    teams = [load(overrides={"team.robots": 5, "planner.kind": kind}) for kind in kinds]
+    assert [kept_by_agent(team) for team in teams] == [pytest.approx(3 / 7), 0.0]
+    asked = load(overrides={"planner.kind": "decentralised", "planner.damping": 0.4})
+    assert kept_by_agent(asked) == 0.4

@@ -7,16 +7,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from quadriga.agents.planner.neighbours import HELD, LOST, PeerData, PeerSelection
-from quadriga.agents.planner.peer_terms import PeerTerms
+from quadriga.agents.planner.peer_terms import Coupling
+from quadriga.agents.planner.peers import LOST, SILENT, PeerSelection
 from quadriga.agents.planner.planner import Planner
-from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
+from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.time_grid import horizon_stance, walking_steps
 from quadriga.shared.config.sections import Config
 from tests.a1 import nominal_forces
-from tests.agents.calm import BASE, NOTHING, STEP, Team, inputs_of, peer, plan, terms_of
-from tests.agents.conftest import fit_ridge
+from tests.agents.calm import BASE, STEP, inputs_of, peer, plan, terms_of
 
 
 def test_the_peers_base_is_that_of_its_own_window(small: Config, predictor: Predictor) -> None:
@@ -37,53 +38,23 @@ def test_unknown_samples_of_a_peer_count_as_no_deviation(
     np.testing.assert_allclose(result.du, 0.0, atol=1e-9)
 
 
-def test_a_silent_peers_terms_are_held_then_it_is_lost(small: Config, predictor: Predictor) -> None:
+def test_a_silent_peer_counts_as_doing_nothing_then_it_is_lost(
+    small: Config, predictor: Predictor
+) -> None:
     planner, inputs = Planner(small, 0, predictor), inputs_of(small)
     push = np.tile([20.0, 0.0, 0.0], (8, 4))
-    fresh = terms_of(small, planner, peer(small, du=push))
-    state, before = planner.step(planner.initial(), inputs, fresh)
+    pushing = terms_of(small, planner, peer(small, du=push))
+    state, before = planner.step(planner.initial(), inputs, pushing)
     assert np.abs(before.du).max() > 0.01
-    silent = peer(small, status=HELD, step=STEP - 5, age=4)
-    held = terms_of(small, planner, silent, before=fresh)
-    state, during = planner.step(state, inputs, held)
-    np.testing.assert_array_equal(during.u, before.u)
-    assert during.used == {"r2": STEP - 5}
-    gone = peer(small, status=LOST, step=STEP - 9, age=8)
-    state, after = planner.step(state, inputs, terms_of(small, planner, gone, before=held))
-    assert after.status == "nominal:peer-lost"
-    assert after.lost == ("r2",)
+    silent = terms_of(small, planner, peer(small, du=push, status=SILENT, step=STEP - 5, age=4))
+    state, during = planner.step(state, inputs, silent)
+    np.testing.assert_allclose(during.du, 0.0, atol=1e-9)
+    assert (silent.used, silent.ages) == ({"r2": STEP - 5}, {"r2": 4})
+    gone = terms_of(small, planner, peer(small, status=LOST, step=STEP - 9, age=8))
+    state, after = planner.step(state, inputs, gone)
+    assert (after.status, gone.lost) == ("nominal:peer-lost", ("r2",))
     np.testing.assert_array_equal(after.u, nominal_forces(horizon_stance(small, 0, STEP)))
     assert state.solves == 2
-
-
-def test_a_silent_peers_effect_is_held_while_the_legs_change(
-    small: Config, predictor: Predictor, linear_team: Team
-) -> None:
-    """Whichever legs its schedule has standing later; what another does adds to it."""
-    three = replace(small, team=replace(small.team, robots=3))
-    meta = replace(PredictorMeta.of(three), ridge=1e-10, block_weight=1.0)
-    planner = Planner(three, 0, fit_ridge([linear_team(3).episode(2500, 1)], meta))
-    base = np.tile(BASE, (small.planner.T_ini, 1))
-    stance = np.repeat(horizon_stance(three, 1, STEP - 1), 3, axis=1)
-    talking = peer(three, du=np.where(stance, np.tile([20.0, 5.0, 0.0], (8, 4)), 0.0))
-    third = peer(three, robot="r3", index=2)
-
-    def terms(step: int, before: PeerTerms, *peers: PeerData) -> PeerTerms:
-        return planner.peer_terms(before, PeerSelection(peers, step - 1), step, base)
-
-    fresh = terms(STEP, NOTHING, talking, third)
-    now = fresh
-    assert np.abs(fresh.effect).max() > 1e-3
-    for step in range(STEP + 1, STEP + 9):
-        silent = peer(three, status=HELD, step=STEP - 1, age=step - STEP)
-        now = terms(step, now, silent, third)
-        np.testing.assert_allclose(now.effect, fresh.effect, atol=1e-7)
-    pushing = replace(third, y_ini=third.y_ini + 0.01)
-    alone = terms(STEP + 9, NOTHING, peer(three), pushing)
-    both = terms(STEP + 9, now, silent, pushing)
-    np.testing.assert_allclose(both.effect, fresh.effect + alone.effect, atol=1e-7)
-    again = terms(STEP + 10, now, peer(three), third)
-    np.testing.assert_allclose(again.effect, 0.0, atol=1e-7)
 
 
 @pytest.mark.parametrize(
@@ -102,11 +73,26 @@ def test_on_the_way_nothing_is_set_up_any_more(
     planner = Planner(config, 0, predictor)
     monkeypatch.setattr("quadriga.agents.planner.peer_terms.Coupling", None)
     monkeypatch.setattr("quadriga.agents.planner.planner.build_problem", None)
-    base, state, terms = np.tile(BASE, (4, 1)), planner.initial(), NOTHING
+    base, state = np.tile(BASE, (4, 1)), planner.initial()
     first = walking_steps(config).start
     for step in range(first, first + 3 * len(walking_steps(config))):
         for steps in behind:
-            terms = planner.peer_terms(
-                terms, PeerSelection((peer(config),), step - steps), step, base
-            )
+            terms = planner.peer_terms(PeerSelection((peer(config),), step - steps), step, base)
             state, _ = planner.step(state, inputs_of(config, step), terms)
+
+
+@given(seed=st.integers(0, 2**32 - 1), peers=st.integers(0, 4))
+def test_leaving_out_swinging_legs_changes_nothing(seed: int, peers: int) -> None:
+    """A force on one is not believed."""
+    rng, N, past = np.random.default_rng(seed), 4, 18 * 3
+    G = rng.normal(size=(peers, 6 * N, past + 12 * N))
+    stance = [rng.random((N, 4)) < 0.5 for _ in range(peers)]
+    told = rng.normal(size=(peers, past + 12 * N))
+    z = told.copy()
+    for part, pattern in zip(z, stance, strict=True):
+        part[past:] *= np.repeat(pattern, 3, axis=1).ravel()
+    expected = sum((block @ part for block, part in zip(G, z, strict=True)), np.zeros(6 * N))
+    found = Coupling(G, stance).effect(told.ravel().astype(np.float32))
+    scale = np.abs(G).max(initial=1.0) * np.abs(z).max(initial=1.0) * z.size
+    np.testing.assert_allclose(found, expected[: len(found)], atol=1e-6 * scale, rtol=0)
+    assert found.dtype == np.float64

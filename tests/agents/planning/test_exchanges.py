@@ -5,16 +5,11 @@ from __future__ import annotations
 import itertools
 from dataclasses import replace
 
-import numpy as np
-import pytest
-
-from quadriga.agents.planning.active_plan import ActivePlan, add_plan, setpoint_at
 from quadriga.agents.planning.interface import Expected
 from quadriga.agents.planning.local import LocalPlanning
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.config.sections import Config
-from quadriga.shared.robots.conventions import Array
 from tests.agents.duet import CONFIG, FIRST_PLAN, every_100_ms, record, simple_predictor
 
 ANSWERS = 2
@@ -94,30 +89,3 @@ def test_a_late_answer_is_skipped_and_not_waited_for() -> None:
     assert (11, 0) in made
     assert (11, 1) not in made
     assert {(10, 1), (10, 2), (12, 0), (12, 1), (12, 2)} <= set(made)
-
-
-def plan_at(start: int, plan_tick: int, value: float, samples: int = 25) -> ActivePlan:
-    deviation: Array = np.full((samples, 12), value) + np.arange(samples)[:, None] * 0.01
-    return ActivePlan(start, plan_tick, deviation, np.full((samples, 6), value))
-
-
-def test_a_plan_with_latency_takes_over_from_the_one_before_and_stays_aligned() -> None:
-    plans: tuple[ActivePlan, ...] = ()
-    seen: dict[int, float] = {}
-    for tick in range(320, 480):
-        if tick % 40 == 0:
-            plans = add_plan(plans, plan_at(tick + 16, tick, float(tick // 40)))
-        seen[tick] = float(setpoint_at(plans, tick).deviation[0])
-    assert seen[335] == 0.0
-    assert seen[336] == pytest.approx(8.01)  # its second sample: the first is over
-    assert seen[375] == pytest.approx(8.05)
-    assert seen[376] == pytest.approx(9.01)
-    assert len(plans) <= 3
-
-
-def test_planned_speeds_are_handed_on_from_the_present_sample_on() -> None:
-    outputs = np.arange(150.0).reshape(25, 6)
-    plans = (ActivePlan(320, 320, np.zeros((25, 12)), outputs),)
-    np.testing.assert_array_equal(setpoint_at(plans, 339).y_ref, outputs[1])
-    np.testing.assert_array_equal(setpoint_at(plans, 569).y_ref, outputs[24])
-    assert setpoint_at(plans, 570).y_ref is None

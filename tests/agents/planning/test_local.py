@@ -10,10 +10,7 @@ import numpy as np
 import pytest
 
 from quadriga.agents.gait import scheduled_stance
-from quadriga.agents.planner.optimality import Residuals
-from quadriga.agents.planner.planner import PlanResult
 from quadriga.agents.planning.active_plan import Setpoint, setpoint_at
-from quadriga.agents.planning.fade import plan_message
 from quadriga.agents.planning.interface import PlanningInputs, PlanningOutputs
 from quadriga.agents.planning.local import LocalPlanning
 from quadriga.agents.planning.registry import CheckedPlanning
@@ -145,15 +142,6 @@ def test_a_message_from_another_time_is_counted() -> None:
     assert outputs.unusual.count("refused_by_planner") == 1
 
 
-def test_a_fallback_is_told_by_its_name_and_not_as_faded() -> None:
-    u, y = np.ones((25, 12)), np.zeros((25, 6))
-    residuals = Residuals(0.0, 0.0, 0.0)
-    for status, expected in (("solved", "faded"), ("nominal:infeasible", "nominal:infeasible")):
-        result = PlanResult(status, u, np.zeros((25, 12)), y, y, {}, (), residuals, 0)
-        assert plan_message(result, 0.5, (8, 0), 320).status == expected
-        assert plan_message(result, 1.0, (8, 0), 320).status == status
-
-
 @pytest.mark.parametrize("mode", [Mode(STAND, 0), Mode(STOPPING, 300, "why")])
 def test_nothing_is_planned_and_nothing_handed_on_unless_walking(mode: Mode) -> None:
     slow = ON_COURSE - np.array([0.0, 0.1, 0.0, 0.0, 0.0, 0.0])
@@ -191,36 +179,17 @@ def test_a_plan_fades_out_beyond_the_range_of_the_data(
     G = simple_predictor(ALONE).future_block(0, 0)
     effect = (G @ (full.plan.u - nominal).ravel()).reshape(25, 6)
     np.testing.assert_allclose(full.plan.y - faded.plan.y, (1.0 - share) * effect, atol=1e-6)
-
-
-def test_the_planned_speeds_are_handed_on_with_the_plan() -> None:
-    slow = ON_COURSE - np.array([0.0, 0.1, 0.0, 0.0, 0.0, 0.0])
-    walker = Walker()
-    outputs = walker.walk(FIRST, slow)
-    assert outputs.plan is not None
-    np.testing.assert_array_equal(walker.applied().y_ref, outputs.plan.y[0])
-
-
-@pytest.mark.parametrize(("excess", "share"), [(1.25, 0.75), (1.5, 0.5), (2.0, 0.0), (3.0, 0.0)])
-def test_the_speeds_of_a_plan_that_fades_out_give_way_to_those_asked_for(
-    excess: float, share: float
-) -> None:
-    """What is published stays what the forces come to: without any, that is the free response."""
-    y = ON_COURSE + np.array([0.0, excess * ALONE.planner.trust_range[1], 0.0, 0.0, 0.0, 0.0])
-    wide = replace(ALONE, planner=replace(ALONE.planner, trust_range=(1e3, 1e3, 1e3, 1e3)))
-    wary = Walker()
-    full, faded = Walker(wide).walk(FIRST, y), wary.walk(FIRST, y)
-    assert full.plan is not None
-    assert faded.plan is not None
+    # Followed are the planned outputs, as far as the plan is applied, else those asked for.
+    expected = ON_COURSE + share * (full.plan.y[0] - ON_COURSE)
     y_ref = wary.applied().y_ref
     assert y_ref is not None
-    expected = ON_COURSE + share * (full.plan.y[0] - ON_COURSE)
     np.testing.assert_allclose(y_ref, expected, atol=1e-12)
-    assert np.abs(faded.plan.y[0, 1:3] - expected[1:3]).max() > 1e-3
 
 
 def test_a_fallback_follows_the_speeds_asked_for() -> None:
+    """It is told by its name, also where little of a plan would be applied."""
     y = ON_COURSE - np.array([0.0, 0.1, 0.0, 0.0, 0.0, 0.0])
+    y[5] += 1.5 * ALONE.planner.trust_range[3]
     limits = replace(ALONE.planner, force_min=200.0, deviation_max=(20.0, 20.0, 5.0))
     walker = Walker(replace(ALONE, planner=limits))
     outputs = walker.walk(FIRST, y)
@@ -230,9 +199,7 @@ def test_a_fallback_follows_the_speeds_asked_for() -> None:
     assert outputs.plan.y[0, 1] < 0.25  # nominal forces alone do not mend it at once
 
 
-@pytest.mark.parametrize(
-    ("absurd", "back"), [(np.nan, 0), (np.inf, 0), (1e170, 0), (1e6, 0), (np.nan, 30), (np.inf, 30)]
-)
+@pytest.mark.parametrize(("absurd", "back"), [(np.nan, 0), (1e170, 0), (1e6, 0), (np.inf, 30)])
 def test_a_plan_of_absurd_samples_is_nominal_by_name_and_follows_what_is_asked_for(
     absurd: float, back: int
 ) -> None:
@@ -251,9 +218,8 @@ def test_a_plan_of_absurd_samples_is_nominal_by_name_and_follows_what_is_asked_f
     np.testing.assert_array_equal(walker.applied().y_ref, ON_COURSE)
 
 
-@pytest.mark.parametrize("absurd", [1e39, 1e300, np.nan])
-@pytest.mark.parametrize("name", ["u", "y"])
-def test_absurd_numbers_of_a_peer_do_not_enter_a_plan(absurd: float, name: str) -> None:
+@pytest.mark.parametrize(("name", "absurd"), [("u", 1e39), ("y", np.nan)])
+def test_absurd_numbers_of_a_peer_do_not_enter_a_plan(name: str, absurd: float) -> None:
     pair = replace(ALONE, team=TeamConfig(robots=2))
     walker = Walker(pair, coupled(pair))
     expected = Walker(pair, coupled(pair)).walk(FIRST).plan

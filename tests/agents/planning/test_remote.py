@@ -94,9 +94,11 @@ def test_older_and_repeated_plans_and_those_of_another_horizon_are_passed_over()
 
 
 @pytest.mark.parametrize(
-    "change", [{"tick": 400, "step": 10}, {"tick": 0, "step": 0}, {"step": 10**9}, {"tick": 327}]
-)
-def test_a_plan_from_another_time_is_not_used_and_blocks_none(change: dict[str, Any]) -> None:
+    "change",
+    [{"tick": 400, "step": 10}, {"tick": 0, "step": 0}, {"u": np.full((N, 12), 1e4)},
+     {"y": np.full((N, 6), -1e308)}],
+)  # fmt: skip
+def test_a_plan_that_cannot_be_meant_is_not_used_and_blocks_none(change: dict[str, Any]) -> None:
     follower = follower_of()
     state, outputs = follow(follower, NOTHING_YET, 365, replace(plan_of(8), **change))
     assert not applied(state, 365).any()
@@ -104,22 +106,6 @@ def test_a_plan_from_another_time_is_not_used_and_blocks_none(change: dict[str, 
     state, outputs = follow(follower, state, 366, plan_of(9))
     assert applied(state, 366).max() == pytest.approx(9.0)
     assert outputs.unusual == ()
-
-
-@pytest.mark.parametrize("sign", [-1.0, 1.0])
-@pytest.mark.parametrize("name", ["u", "y"])
-@pytest.mark.parametrize("size", [120.0, 1e4, 1e308])
-def test_a_plan_that_no_planner_makes_is_not_used_and_blocks_none(
-    name: str, size: float, sign: float
-) -> None:
-    follower, wild = follower_of(), plan_of(9)
-    values = getattr(wild, name).copy()
-    values[3, 5] += sign * size
-    state, outputs = follow(follower, NOTHING_YET, 365, replace(wild, **{name: values}))
-    assert not applied(state, 365).any()
-    assert outputs.unusual == ("refused_by_planner",)
-    state, outputs = follow(follower, state, 366, plan_of(9))
-    assert applied(state, 366).max() == pytest.approx(9.0)
 
 
 @pytest.mark.parametrize("largest", [(20.0, 20.0, 60.0), (0.0, 0.0, 0.0)])
@@ -140,19 +126,14 @@ def test_the_age_of_the_plan_in_use_is_told_at_every_tick() -> None:
         assert follow(follower, state, tick)[1].ages_ms == {"plan": tick - 320.0}
 
 
-def test_a_plan_fades_out_beyond_the_range_of_the_data() -> None:
-    far = ON_COURSE + np.array([0.0, 1.5 * CONFIG.planner.trust_range[1], 0.0, 0.0, 0.0, 0.0])
-    state, outputs = follow(follower_of(), NOTHING_YET, 321, plan_of(8), y=far)
-    assert applied(state, 321).max() == pytest.approx(4.0)
-    assert outputs.unusual == ("plan_faded",)
-
-
-def test_speeds_of_a_plan_that_fades_out_give_way_to_those_asked_for() -> None:
+def test_a_plan_fades_out_beyond_the_range_of_the_data_and_follows_what_is_asked_for() -> None:
     follower, faster = follower_of(), plan_of(8)
     faster = replace(faster, y=faster.y + np.array([0.0, 0.2, 0.1, 0.0, 0.0, 0.0]))
     off = np.array([0.0, CONFIG.planner.trust_range[1], 0.0, 0.0, 0.0, 0.0])
     for times, share in ((0.0, 1.0), (1.5, 0.5), (2.0, 0.0)):
-        state, _ = follow(follower, NOTHING_YET, 321, faster, y=ON_COURSE + times * off)
+        state, outputs = follow(follower, NOTHING_YET, 321, faster, y=ON_COURSE + times * off)
+        assert applied(state, 321).max() == pytest.approx(8.0 * share)
+        assert outputs.unusual == (() if share == 1.0 else ("plan_faded",))
         y_ref = setpoint_at(state.plans, 321).y_ref
         assert y_ref is not None
         np.testing.assert_allclose(y_ref[1:3], [0.3 + 0.2 * share, 0.1 * share], atol=1e-12)

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy import integrate, linalg, optimize
 
-from quadriga.agents.planner import planner_qp
-from quadriga.agents.planner.planner_qp import Condensed
+from quadriga.agents.planner import qp
+from quadriga.agents.planner.qp import Condensed
 from quadriga.agents.predictor.episode import Y_SCALE, Episode
 from quadriga.agents.predictor.gates import (
     Bounds,
@@ -174,7 +174,7 @@ def test_a_new_key_of_the_cost_is_gated_anew(
     stored: Path, plant: Config, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As if `force_min` weighed the differences between successive forces: no list names it."""
-    condense = planner_qp.condense
+    condense = qp.condense
 
     def smoothing(
         config: PlannerConfig, G_past: Array, G_u: Array, stance: NDArray[np.bool_]
@@ -184,7 +184,7 @@ def test_a_new_key_of_the_cost_is_gated_anew(
         return replace(usual, H=usual.H + config.force_min * steps.T @ steps)
 
     before = load_checked(stored, plant)[1].gates
-    monkeypatch.setattr(planner_qp, "condense", smoothing)
+    monkeypatch.setattr(qp, "condense", smoothing)
     assert load_checked(stored, plant)[1].gates == before, "its default changes no QP"
     smooth = replace(plant, planner=replace(plant.planner, force_min=5.0))
     assert load_checked(stored, smooth)[1].gates.radius < 0.9 * before.radius

@@ -12,7 +12,7 @@ from scipy import optimize
 
 from quadriga.agents.planner.peer_terms import PeerTerms
 from quadriga.agents.planner.planner import Planner, PlannerInputs
-from quadriga.agents.planner.team_planner import build_centralised
+from quadriga.agents.planner.team import build_centralised
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config
@@ -147,18 +147,6 @@ def test_the_plan_is_what_the_team_will_do(
     du = (result.u - nominal_forces(planned)).transpose(1, 0, 2)
     happened = BASE + team.respond(np.concatenate([past, du]))[40:]
     np.testing.assert_allclose(result.y, happened.transpose(1, 0, 2), atol=1e-6)
-
-
-def test_a_broken_measurement_gives_nominal_forces_for_all(
-    small: Config, predictor: Predictor
-) -> None:
-    inputs = disturbed(small, 7)
-    broken = inputs[1].y_ini.copy()
-    broken[0, 0] = np.nan
-    result = build_centralised(small, predictor).step([inputs[0], replace(inputs[1], y_ini=broken)])
-    assert result.status == "nominal:not-finite"
-    for i in range(2):
-        np.testing.assert_array_equal(result.u[i], nominal_forces(horizon_stance(small, i, STEP)))
 
 
 def test_a_predictor_of_another_team_is_refused(small: Config, predictor: Predictor) -> None:

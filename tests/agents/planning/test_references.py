@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quadriga.agents.planning.operator_references import reference_at, remember_references
+from quadriga.agents.planning.references import reference_at, remember_references
 from quadriga.shared.messages import Reference
 
 HEIGHT = 0.26

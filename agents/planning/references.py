@@ -1,4 +1,4 @@
-"""What the operator asked for, and which of it is in force at a tick."""
+"""What the operator asked for, and with it the window and the horizon that a plan is made of."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from typing import Final
 
 import numpy as np
 
-from quadriga.agents.predictor.episode import output_base
+from quadriga.agents.planner.planner import PlannerInputs
+from quadriga.agents.predictor.episode import commanded_outputs, output_base
 from quadriga.shared.config.sections import Config
-from quadriga.shared.messages import Reference
+from quadriga.shared.messages import Measurement, Reference
 from quadriga.shared.robots.conventions import Array
 from quadriga.shared.topics import SAMPLE_MS
 
@@ -55,3 +56,38 @@ def base_of_window(
     if first is last:  # as nearly always
         return np.tile(output_base(config, last), (len(known), 1))
     return np.array([output_base(config, reference_at(references, t, height)[0]) for t in known])
+
+
+def is_gapless(samples: tuple[Measurement, ...], count: int, end: int) -> bool:
+    """Whether the last `count` samples up to the tick `end` are there."""
+    return len(samples) >= count and samples[-count].tick == end - SAMPLE_MS * (count - 1)
+
+
+def build_planner_inputs(
+    config: Config,
+    step: int,
+    end: int,
+    samples: tuple[Measurement, ...],
+    references: tuple[Reference, ...],
+) -> PlannerInputs:
+    """What a planning step consumes of a robot itself.
+
+    Args:
+        config: the team's configuration.
+        step: planning step.
+        end: its tick, at which the last sample ends.
+        samples: of the robot, at least the T_ini up to `end`.
+        references: what the operator asked for lately.
+    """
+    planner, window = config.planner, samples[-config.planner.T_ini :]
+    now, _ = reference_at(references, end, config.reference.height)
+    return PlannerInputs(
+        step=step,
+        u_ini=np.array([sample.u for sample in window]),
+        y_ini=np.array([sample.y for sample in window]),
+        stance_ini=np.array([sample.stance for sample in window]) > 0.5,
+        y_base_ini=base_of_window(config, end, references),
+        y_base=np.repeat(output_base(config, now)[None], planner.N, axis=0),
+        y_des=np.repeat(commanded_outputs(now)[None], planner.N, axis=0),
+        weight=config.robot.weight,
+    )

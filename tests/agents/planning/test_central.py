@@ -2,28 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from itertools import permutations
-from typing import cast
 
 import numpy as np
 import pytest
 
 from quadriga.agents.gait import scheduled_stance
-from quadriga.agents.planner.planner import PlannerInputs
-from quadriga.agents.planner.team_planner import TeamPlanner, TeamResult, build_centralised
-from quadriga.agents.planning.reference_slew import ReferenceSlew
-from quadriga.agents.planning.team import Central, CentralOutputs, CentralState
+from quadriga.agents.planner.team import build_centralised
+from quadriga.agents.planning.central import Central, CentralOutputs, CentralState
 from quadriga.agents.rehearsal import rehearse_central
 from quadriga.identification.rollout import Rollout
-from quadriga.shared.codec import encode
 from quadriga.shared.config.sections import Config, PlannerConfig, TeamConfig
-from quadriga.shared.messages import Measurement, Reference
+from quadriga.shared.messages import Measurement
 from quadriga.shared.modes import PASSIVE, STOPPING, Mode
-from quadriga.shared.robots.conventions import Array
 from tests.a1 import nominal_forces
-from tests.agents.duet import asked, every_100_ms, fingerprint, simple_predictor
+from tests.agents.duet import asked, every_100_ms, simple_predictor
 
 CONFIG = Config(team=TeamConfig(robots=2), planner=PlannerConfig(kind="centralised"))
 CENTRAL = Central(CONFIG, build_centralised(CONFIG, simple_predictor(CONFIG)))
@@ -95,42 +89,6 @@ def test_the_order_of_arrival_does_not_matter_and_strangers_do_not_count() -> No
     assert len(results) == 1
 
 
-@pytest.mark.parametrize(
-    ("u", "refused"), [(np.full((25, 12), np.nan), ["r2"]), (np.zeros((7, 12)), ["r1", "r2"])]
-)
-def test_a_plan_that_cannot_be_meant_is_refused_for_its_robot_by_name(
-    u: Array, refused: list[str]
-) -> None:
-    class Faulty:
-        def step(self, inputs: Sequence[PlannerInputs]) -> TeamResult:
-            result = CENTRAL._planner.step(inputs)
-            return replace(result, u=np.stack([result.u[0], u]) if len(u) == 25 else u)
-
-    central = Central(CONFIG, cast("TeamPlanner", Faulty()))
-    (_, expected), (_, found) = CENTRAL.step(heard(320)), central.step(heard(320))
-    assert found.unusual == ("refused_plan_of_centralised",) * len(refused)
-    for (name, plan), (_, right) in zip(found.plans, expected.plans, strict=True):
-        if name not in refused:
-            assert encode(plan) == encode(right)
-            continue
-        stance = scheduled_stance(CONFIG, int(name[1]) - 1, 320 + 10 * np.arange(25))
-        np.testing.assert_array_equal(plan.u, nominal_forces(stance))
-        np.testing.assert_array_equal(plan.y, np.tile(ON_COURSE, (25, 1)))
-        assert plan.status.startswith("nominal:plan of centralised refused: forces")
-
-
-def test_the_clock_is_only_told() -> None:
-    ticking = iter(range(0, 1000, 7))
-    timed = Central(
-        CONFIG, build_centralised(CONFIG, simple_predictor(CONFIG)), lambda: next(ticking)
-    )
-    _, outputs = timed.step(heard(320))
-    _, untimed = CENTRAL.step(heard(320))
-    assert (outputs.planner_ns, untimed.planner_ns) == (7, 0)
-    assert outputs.plans[0][1].u.tobytes() == untimed.plans[0][1].u.tobytes()
-    assert replace(outputs, planner_ns=0).plans[0][1].used == untimed.plans[0][1].used
-
-
 def test_a_rehearsal_plans_two_steps_of_standing() -> None:
     planned: list[int] = []
 
@@ -142,60 +100,6 @@ def test_a_rehearsal_plans_two_steps_of_standing() -> None:
 
     rehearse_central(CONFIG, Watched(CONFIG, build_centralised(CONFIG, simple_predictor(CONFIG))))
     assert planned == [8, 8, 9, 9]
-
-
-@pytest.mark.parametrize("name", ["r1", "r2"])
-@pytest.mark.parametrize("ahead", [210, 1000, 10**12])
-def test_a_sample_of_a_time_far_ahead_is_refused_and_makes_none_late(name: str, ahead: int) -> None:
-    _, forged = sample(name, 0)
-    state = CENTRAL.remember(heard(350), [(name, replace(forged, tick=350 + ahead))], ())
-    assert state.refused == 1
-    state = heard(360, start=state)
-    assert CENTRAL.due(state) == 9
-    made, usual = (CENTRAL.step(which)[1] for which in (state, heard(360)))
-    assert fingerprint(made) == fingerprint(usual)
-    assert heard(370, start=state).refused == 1
-
-
-def test_a_reference_that_jumps_is_approached_as_agents_do() -> None:
-    slew, state, given = ReferenceSlew(CONFIG), CentralState(), list[Reference]()
-    for k in range(4):
-        asked = Reference(100 * k, 0, 1.2 * (-1) ** k, 0.0, 0.0, 0.26)
-        given.append(slew.limit(asked))
-        state = CENTRAL.remember(state, (), [asked])
-    assert state.references == tuple(given)
-    assert given[1].vx > 0.0
-
-
-@pytest.mark.parametrize("robots", [1, 2, 3, 4])
-def test_after_a_silence_of_all_the_team_plans_again(robots: int) -> None:
-    config = replace(CONFIG, team=TeamConfig(robots=robots))
-    central = Central(config, build_centralised(config, simple_predictor(config)))
-    state, names = CentralState(), [f"r{k + 1}" for k in range(robots)]
-    for tick in (*range(10, 350, 10), *range(5000, 5400, 10)):
-        state = central.remember(state, [sample(name, tick) for name in names], ())
-    assert 0 < state.refused < 2 * robots
-    assert central.due(state) == 5390 // 40
-
-
-def test_a_third_robot_that_claims_another_time_stops_nobody_else() -> None:
-    config = replace(CONFIG, team=TeamConfig(robots=3))
-    central, state = (
-        Central(config, build_centralised(config, simple_predictor(config))),
-        CentralState(),
-    )
-    for tick in range(10, 600, 10):
-        both = [sample("r1", tick), sample("r2", tick)]
-        wrong = sample("r3", 10**6 + tick if tick > 300 else tick)
-        state = central.remember(state, [wrong, *both], ())
-    assert [held[-1].tick for _, held in sorted(state.windows.items())] == [590, 590, 300]
-
-
-def test_references_of_a_time_far_ahead_are_refused() -> None:
-    ahead = [replace(asked(), tick=tick) for tick in (400, 1350, 1351, 1 << 41)]
-    state = CENTRAL.remember(heard(350), (), ahead)
-    assert [reference.tick for reference in state.references] == [0, 400, 1350]
-    assert state.refused == 2
 
 
 @pytest.mark.parametrize("name", ["r1", "r2"])

@@ -11,8 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from quadriga.agents.gait import scheduled_stance
-from quadriga.agents.planner.neighbours import FRESH, HELD, LOST, SHIFTED, Neighbours, PeerData
-from quadriga.agents.planner.peer_memory import PeerMemory
+from quadriga.agents.planner.peers import LOST, SILENT, USABLE, Neighbours, PeerData, PeerMemory
 from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config
 from quadriga.shared.messages import Measurement, Plan
@@ -92,7 +91,7 @@ def expected_du(step: int, age: int) -> Array:
 def test_at_step_k_the_plan_and_the_window_of_step_k_minus_1_are_used() -> None:
     ticks = list(range(10, 810, 10))
     peer = of(remember(20, list(range(FIRST, 21)), ticks), 20)
-    assert (peer.status, peer.step, peer.age) == (FRESH, 19, 0)
+    assert (peer.status, peer.step, peer.age) == (USABLE, 19, 0)
     np.testing.assert_allclose(peer.du, expected_du(20, 0), atol=1e-9)
     marks = np.array([mark("r2", tick) for tick in window_ticks(20)])
     assert window_ticks(20)[-1] == 40 * 19
@@ -101,32 +100,29 @@ def test_at_step_k_the_plan_and_the_window_of_step_k_minus_1_are_used() -> None:
     assert peer.known.all()
 
 
-@pytest.mark.parametrize(("age", "status"), [(0, FRESH), (1, SHIFTED), (2, SHIFTED)])
-def test_a_missing_plan_is_replaced_by_the_newest_one_shifted_by_its_age(
+@pytest.mark.parametrize(
+    ("age", "status"), [(0, USABLE), (1, USABLE), (2, USABLE), (3, SILENT), (5, SILENT), (6, LOST)]
+)
+def test_a_missing_plan_is_replaced_by_the_newest_one_shifted_then_the_peer_is_silent_then_lost(
     age: int, status: str
 ) -> None:
     newest = 19 - age
-    peer = of(remember(20, [newest - 1, newest, 20], window_ticks(20)), 20)
-    assert (peer.status, peer.step, peer.age) == (status, newest, age)
-    np.testing.assert_allclose(peer.du, expected_du(20, age), atol=1e-9)
-
-
-@pytest.mark.parametrize(("age", "status"), [(3, HELD), (4, HELD), (5, HELD), (6, LOST), (9, LOST)])
-def test_past_the_maximum_age_a_peer_is_held_then_lost(age: int, status: str) -> None:
-    memory = remember(19 - age, [19 - age], [])
+    memory = remember(newest, [newest - 1, newest], [])
     memory = NEIGHBOURS.remember(memory, 40 * 20, [("r2", measurement("r2", 760))], [])
     peer = of(memory, 20)
-    assert (peer.status, peer.age) == (status, age)
-    assert not peer.usable
-    selection = NEIGHBOURS.select(memory, 19, 20)  # r3 has no first plan to be late with
-    assert selection.lost == (("r2",) if status == LOST else ())
+    assert (peer.status, peer.step, peer.age) == (status, newest, age)
+    if status == USABLE:
+        np.testing.assert_allclose(peer.du, expected_du(20, age), atol=1e-9)
+    selection = NEIGHBOURS.select(memory, 19, FIRST)
+    assert selection.lost == NEIGHBOURS.lost_peers(memory, 19, FIRST)
+    assert ("r2" in selection.lost) == (status == LOST)
 
 
 def test_the_first_planning_step_needs_nobodys_plan() -> None:
     memory = remember(FIRST, [], window_ticks(FIRST))
     selection = NEIGHBOURS.select(memory, FIRST - 1, FIRST)
     assert selection.used == {}
-    assert [peer.status for peer in selection.peers] == [FRESH, FRESH]
+    assert [peer.status for peer in selection.peers] == [USABLE, USABLE]
     assert all((peer.du == 0).all() for peer in selection.peers)
     assert selection.peers[0].known.all()
     assert not selection.peers[1].known.any()
@@ -135,23 +131,22 @@ def test_the_first_planning_step_needs_nobodys_plan() -> None:
 def test_a_peer_that_never_plans_is_lost_in_the_end() -> None:
     memory = NEIGHBOURS.initial()
     seen = [of(memory, step).status for step in range(FIRST, FIRST + 7)]
-    assert seen == [FRESH, SHIFTED, SHIFTED, HELD, HELD, HELD, LOST]
+    assert seen == [USABLE] * 3 + [SILENT] * 3 + [LOST]
 
 
 @pytest.mark.parametrize(
-    ("stands_at", "status"),
+    ("stands_at", "step", "status"),
     [
-        (760, FRESH),  # it planned since: it walks again
-        (800, FRESH),  # the sample of the very tick of its plan
-        (810, LOST),
-        (840, LOST),
-        (850, SHIFTED),  # later than what may be used
+        (760, 21, USABLE),  # it planned since: it walks again
+        (800, 21, USABLE),  # the sample of the very tick of its plan
+        (810, 22, LOST),
+        (840, 22, LOST),
+        (850, 22, USABLE),  # later than what may be used
     ],
 )
 def test_a_peer_that_has_come_to_stand_since_its_plan_is_lost_at_once(
-    stands_at: int, status: str
+    stands_at: int, step: int, status: str
 ) -> None:
-    step = 21 if status == FRESH else 22
     walked = [("r2", measurement("r2", tick)) for tick in range(700, stands_at, 10)]
     stood = replace(measurement("r2", stands_at), stance=np.ones(4))
     memory = NEIGHBOURS.remember(
@@ -200,30 +195,21 @@ def test_foreign_messages_are_refused_and_counted() -> None:
     assert memory.peers == NEIGHBOURS.initial().peers
 
 
-@pytest.mark.parametrize("absurd", [1e39, -1e39, 1e4, np.inf, np.nan])
-def test_numbers_that_no_robot_can_mean_are_refused_and_counted(absurd: float) -> None:
-    now, good, sample = 40 * 20, plan("r2", 20), measurement("r2", 40 * 20)
-    bad_plans, bad_samples = [], []
-    for name in ("u", "y"):
-        one = getattr(good, name).copy()
-        one[-1, -1] = absurd
-        bad_plans.append(("r2", replace(good, **{name: one})))
-        other = getattr(sample, name).copy()
-        other[-1] = absurd
-        bad_samples.append(("r2", replace(sample, **{name: other})))
-    memory = NEIGHBOURS.remember(NEIGHBOURS.initial(), now, bad_samples, bad_plans)
-    assert memory.refused == 4
-    assert memory.peers == NEIGHBOURS.initial().peers
-
-
-@pytest.mark.parametrize("force", [1200.0, -1200.0, 600.0])
-def test_forces_that_no_leg_can_carry_are_refused(force: float) -> None:
+@pytest.mark.parametrize(
+    ("name", "absurd"),
+    [("u", 1e39), ("y", -1e39), ("y", np.nan), ("u", np.inf), ("u", 1200.0), ("u", -600.0)],
+)
+def test_numbers_that_no_robot_can_mean_are_refused_and_counted(name: str, absurd: float) -> None:
+    """Of forces those, too, that no leg can carry."""
     good, sample = plan("r2", 20), measurement("r2", 40 * 20)
-    u, one = good.u.copy(), sample.u.copy()
-    u[3, 2] = one[2] = force
-    bad_plan, bad_sample = ("r2", replace(good, u=u)), ("r2", replace(sample, u=one))
-    memory = NEIGHBOURS.remember(NEIGHBOURS.initial(), 800, [bad_sample], [bad_plan])
+    one, other = getattr(good, name).copy(), getattr(sample, name).copy()
+    one[-1, -1] = other[-1] = absurd
+    bad_plan, bad_sample = replace(good, **{name: one}), replace(sample, **{name: other})
+    memory = NEIGHBOURS.remember(
+        NEIGHBOURS.initial(), 800, [("r2", bad_sample)], [("r2", bad_plan)]
+    )
     assert memory.refused == 2
+    assert memory.peers == NEIGHBOURS.initial().peers
 
 
 def test_the_largest_forces_that_may_be_planned_are_taken() -> None:
@@ -275,10 +261,9 @@ def test_loss_repetition_and_reordering(
     usable = [s for s in steps if s < step]
     newest = max(usable, default=FIRST - 1)
     age = step - 1 - newest
-    limits = (0, PLANNER.max_peer_age, PLANNER.max_peer_age + PLANNER.hold_steps)
-    status = (FRESH, SHIFTED, HELD, LOST)[sum(age > limit for limit in limits)]
-    assert peer.status == status
-    if not peer.usable:
+    limits = (PLANNER.max_peer_age, PLANNER.max_peer_age + PLANNER.hold_steps)
+    assert peer.status == (USABLE, SILENT, LOST)[sum(age > limit for limit in limits)]
+    if peer.status != USABLE:
         return
     assert peer.step == (newest if usable else None)
     np.testing.assert_allclose(
@@ -302,7 +287,7 @@ def test_brought_forward_the_window_ends_now_and_its_end_is_what_the_peer_planne
     memory = remember(20, [18, 19, 20], list(range(10, 810, 10)))
     selection = NEIGHBOURS.select(memory, 19, FIRST, window_step=20)
     peer = selection.peers[0]
-    assert (peer.status, peer.step, peer.age, selection.window_step) == (FRESH, 19, 0, 20)
+    assert (peer.status, peer.step, peer.age, selection.window_step) == (USABLE, 19, 0, 20)
     # Samples after the step that may be looked at come from its plan, measured or not.
     expected = [mark("r2", 750), mark("r2", 760), *(told(19, k) for k in range(4))]
     np.testing.assert_allclose(peer.y_ini[:, 0], expected)
@@ -334,3 +319,10 @@ def test_complete_means_every_peer_s_plan_and_the_samples_before_it() -> None:
     assert not NEIGHBOURS.is_complete(both, (20, 0))
     without = NEIGHBOURS.remember(memory, 780, r3[:-1], [("r3", plan("r3", 19))])
     assert not NEIGHBOURS.is_complete(without, (19, 0))
+
+
+def test_plans_of_before_a_stop_do_not_count() -> None:
+    memory = remember(20, [12, 13], window_ticks(20))
+    peer = NEIGHBOURS.select(memory, 19, 20).peers[0]
+    assert (peer.status, peer.step, peer.age) == (USABLE, None, 0)
+    assert not peer.du.any()

@@ -10,6 +10,7 @@ formulation (local eq. 12, centralised eq. 7, DeePC eq. 5) is such a `Condensed`
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +18,13 @@ from numpy.typing import NDArray
 from quadriga.agents.gait import nominal_forces
 from quadriga.shared.config.sections import PlannerConfig
 from quadriga.shared.robots.conventions import N_FORCES, N_OUTPUTS, Array
+from quadriga.shared.runtime.jit import compiled
+from quadriga.shared.runtime.record import record
 
-NO_BOUNDS = "none"
+NO_BOUNDS: Final = "none"
+# An answer with larger residuals is not used, whatever status the solver reports.
+MAX_VIOLATION: Final = 1e-5  # N
+MAX_STATIONARITY: Final = 1e-5  # relative to the terms of the gradient
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +42,6 @@ class Condensed:
         Y_past: shape (p N, P).
         Y_des: effect of y_des on the predicted outputs, shape (p N, p N); None if there is none, as
             in every formulation with a transition matrix.
-        gradient: of a formulation with a transition matrix, G_uᵀ Q̄ = −F_des, shape (nv, p N).
     """
 
     H: Array
@@ -45,7 +50,6 @@ class Condensed:
     Y_v: Array
     Y_past: Array
     Y_des: Array | None = None
-    gradient: Array | None = None
 
     def free(self, past: Array, y_des: Array) -> Array:
         """Predicted output deviations with v = 0. Shape (p N,)."""
@@ -83,41 +87,22 @@ class PlannerProblem:
     @property
     def gradient(self) -> Array:
         """Of a problem with a transition matrix: G_uᵀ Q̄, so that f = G_uᵀ Q̄ (y_free − y_des)."""
-        if self.condensed.gradient is None:
-            raise ValueError("only a problem with a transition matrix has this gradient")
-        return self.condensed.gradient
+        return -self.condensed.F_des
 
     def linear_term(self, past: Array, y_des: Array) -> Array:
         """The linear term f of the cost, shape (nv,)."""
         f: Array = self.condensed.F_past @ past + self.condensed.F_des @ y_des
         return f
 
-    def bounds(self, error: Array) -> tuple[Array | None, Array | None]:
-        """Bounds of [v; A v] for a free response that is off y_des by `error`, shape (p N,).
-
-        None if they do not depend on the free response.
-        """
+    def bounds(self, error: Array | None = None) -> tuple[Array, Array]:
+        """Bounds of [v; A v] for a free response that is off y_des by `error`, shape (p N,)."""
         rows = len(self.bounded)
-        if not rows:
-            return None, None
+        if not rows or error is None:
+            return self.lower, self.upper
         lower, upper = self.lower.copy(), self.upper.copy()
         lower[-rows:] -= error[self.bounded]
         upper[-rows:] -= error[self.bounded]
         return lower, upper
-
-    def keeps_outputs(self, v: Array, lower: Array, upper: Array) -> bool:
-        """Whether forces v, shape (nv,), keep the bounds on outputs; true if there are none.
-
-        Args:
-            v: deviations of the forces of stance legs, N.
-            lower: of `bounds`, for the free response at hand.
-            upper: the same.
-        """
-        rows = len(self.bounded)
-        if not rows:
-            return True
-        y = self.A[-rows:] @ v
-        return bool((lower[-rows:] <= y).all() and (y <= upper[-rows:]).all())
 
 
 def condense(
@@ -137,9 +122,7 @@ def condense(
     H = gradient @ G
     H = 0.5 * (H + H.T)
     H.flat[:: len(H) + 1] += np.tile(config.R, len(columns) // 3)
-    return Condensed(
-        H, gradient @ G_past, -gradient, G, np.ascontiguousarray(G_past), gradient=gradient
-    )
+    return Condensed(H, gradient @ G_past, -gradient, G, np.ascontiguousarray(G_past))
 
 
 def build_problem(
@@ -154,9 +137,9 @@ def build_problem(
     Args:
         config: weights, friction, bounds.
         weight: of one robot, N.
-        G_u: columns that multiply the future forces, shape (6 N n, 12 N n).
-        stance: scheduled stance over the horizon, shape (N n, 4).
-        G_past: columns that multiply the past, shape (6 N n, P); None: without a past.
+        G_u: see `condense`.
+        stance: see `condense`.
+        G_past: see `condense`; None: without a past.
     """
     past = np.zeros((len(G_u), 0)) if G_past is None else G_past
     return constrain(config, weight, condense(config, past, G_u, stance), stance)
@@ -189,9 +172,8 @@ def constrain(
         A = np.concatenate([A, condensed.Y_v[bounded]])
         lower.append(-limit[bounded])
         upper.append(limit[bounded])
-    return PlannerProblem(
-        condensed, columns, A, np.concatenate(lower), np.concatenate(upper), bounded, c
-    )
+    bounds = np.concatenate(lower), np.concatenate(upper)
+    return PlannerProblem(condensed, columns, A, *bounds, bounded, c)
 
 
 def stance_columns(stance: NDArray[np.bool_]) -> NDArray[np.int64]:
@@ -205,3 +187,72 @@ def unpack(problem: PlannerProblem, v: Array, y_free: Array) -> tuple[Array, Arr
     du = np.zeros(len(dy) // N_OUTPUTS * N_FORCES)
     du[problem.columns] = v
     return du.reshape(-1, N_FORCES), dy.reshape(-1, N_OUTPUTS)
+
+
+# ---- how well an answer fulfils the Karush-Kuhn-Tucker conditions
+
+
+@record
+class Residuals:
+    """How well the Karush-Kuhn-Tucker conditions hold.
+
+    Attributes:
+        stationarity: ‖H v + f + λ_box + Aᵀ λ_A‖∞ over the largest of its terms (at least 1); for
+            the closed form an upper bound of it.
+        primal: largest violation of a bound [N].
+        complementarity: largest |λ · distance to its bound|, over the same terms [N].
+    """
+
+    stationarity: float
+    primal: float
+    complementarity: float
+
+
+@compiled
+def is_optimal(primal: float, stationarity: float) -> bool:
+    """Whether an answer with these residuals is used; not if one is NaN."""
+    return primal <= MAX_VIOLATION and stationarity <= MAX_STATIONARITY
+
+
+def residuals(
+    problem: PlannerProblem, f: Array, v: Array, multipliers: Array, error: Array | None = None
+) -> Residuals:
+    """Karush-Kuhn-Tucker residuals; positive multipliers belong to upper bounds.
+
+    Args:
+        problem: the QP.
+        f: linear term, (nv,).
+        v: answer, (nv,).
+        multipliers: of [v; A v], (nv + m,).
+        error: see `PlannerProblem.bounds`.
+    """
+    low, high = problem.bounds(error)
+    values = np.concatenate([v, problem.A @ v])
+    pull = problem.A.T @ multipliers[len(v) :]
+    return Residuals(*largest_residuals(problem.H @ v, f, pull, values, multipliers, low, high))
+
+
+@compiled
+def largest_residuals(
+    Hv: Array, f: Array, pull: Array, values: Array, multipliers: Array, low: Array, high: Array
+) -> tuple[float, float, float]:
+    """The figures of `Residuals` from H v, Aᵀ λ_A and [v; A v]; NaN if a number is."""
+    off = bent = asked = pulled = beyond = loose = 0.0
+    for i in range(len(Hv)):
+        total = multipliers[i] + pull[i]
+        off = _worse(off, abs(Hv[i] + f[i] + total))
+        bent, asked = _worse(bent, abs(Hv[i])), _worse(asked, abs(f[i]))
+        pulled = _worse(pulled, abs(total))
+    for i in range(len(values)):
+        beyond = _worse(_worse(beyond, values[i] - high[i]), low[i] - values[i])
+        if multipliers[i] != 0.0:
+            bound = high[i] if multipliers[i] > 0.0 else low[i]
+            loose = _worse(loose, abs(multipliers[i] * (values[i] - bound)))
+    scale = max(1.0, bent, asked, pulled)
+    return off / scale, beyond, loose / scale
+
+
+@compiled
+def _worse(a: float, b: float) -> float:
+    """The larger of two numbers, NaN if one is."""
+    return b if b > a or b != b else a

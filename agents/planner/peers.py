@@ -1,0 +1,316 @@
+"""The one-step communication delay: which of its peers' messages an agent uses at step k.
+
+At step k each peer's plan and T_ini window of step k−1 are used (eq. 11), never those of step k,
+unless the agents answer each other within a step (`planner.exchanges`).
+Pure: messages in, selection out; lost, repeated, late and foreign messages are all accounted for.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, Final, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadriga.agents.gait import nominal_forces, scheduled_stance
+from quadriga.agents.plausibility import is_plausible
+from quadriga.agents.time_grid import horizon_stance, patience, sample_starts, step_ms
+from quadriga.shared.config.sections import Config
+from quadriga.shared.messages import Measurement, Plan
+from quadriga.shared.robots.conventions import N_FORCES, N_OUTPUTS, Array, robot_names
+from quadriga.shared.runtime.record import record
+from quadriga.shared.topics import MEASUREMENT, SAMPLE_MS
+
+USABLE: Final = "usable"  # the newest plan that may be used, shifted by its age
+SILENT: Final = "silent"  # that plan is too old: the peer counts as doing nothing
+LOST: Final = "lost"  # silent for too long, or the peer has stopped: the team stops
+
+M = TypeVar("M", bound=Measurement | Plan)
+
+
+@record
+class PeerHistory:
+    """What is remembered of one peer: measurements by tick and plans by step, both ascending."""
+
+    measurements: tuple[Measurement, ...] = ()
+    plans: tuple[Plan, ...] = ()
+
+
+@record
+class PeerMemory:
+    """Recent messages of all peers by name, and how many were refused."""
+
+    peers: Mapping[str, PeerHistory]
+    refused: int = 0
+
+
+@record
+class PeerData:
+    """One peer's part of eq. 11 at planning step k; its window ends at `PeerSelection.window_step`.
+
+    Attributes:
+        robot: the peer's name.
+        index: its place in the team, 0-based.
+        status: usable, silent or lost; only the arrays of a usable peer are of use.
+        step: step of the plan used, or None while the peer has never planned.
+        age: number of steps by which that plan is older than the newest one allowed.
+        known: samples of the window that are measured or predicted, shape (T_ini,).
+        du_ini: force deviations of the window, zero where unknown, shape (T_ini, 12), N.
+        y_ini: outputs of the window, shape (T_ini, 6); meaningless where unknown.
+        du: planned force deviations from the window's end on, shape (N, 12), N.
+    """
+
+    robot: str
+    index: int
+    status: str
+    step: int | None
+    age: int
+    known: NDArray[np.bool_]
+    du_ini: Array
+    y_ini: Array
+    du: Array
+
+
+@record
+class PeerSelection:
+    """Everything an agent takes from its peers at one planning step.
+
+    Attributes:
+        peers: each peer's part.
+        window_step: planning step at which the peers' windows end.
+    """
+
+    peers: tuple[PeerData, ...] = ()
+    window_step: int = 0
+
+    @property
+    def used(self) -> dict[str, int]:
+        """Step of the plan used, by peer; peers that never planned are left out."""
+        return {peer.robot: peer.step for peer in self.peers if peer.step is not None}
+
+    @property
+    def lost(self) -> tuple[str, ...]:
+        """Names of the peers given up."""
+        return tuple(peer.robot for peer in self.peers if peer.status == LOST)
+
+
+class Neighbours:
+    """The delay protocol of one agent; holds no state beyond its configuration.
+
+    Args:
+        config: the team's configuration.
+        index: this agent's place in the team, 0-based.
+        peers: places of the robots that matter to it; None: all others.
+
+    Attributes:
+        names: of these robots.
+    """
+
+    def __init__(self, config: Config, index: int, peers: frozenset[int] | None = None) -> None:
+        self._config, self._step_ms = config, step_ms(config)
+        self._indices = {
+            name: j
+            for j, name in enumerate(robot_names(config.team.robots))
+            if (j != index if peers is None else j in peers)
+        }
+        self.names = tuple(self._indices)
+        # Messages are kept back to the window of the oldest plan that may be used.
+        steps = patience(config) + 2
+        self._span_ms = SAMPLE_MS * config.planner.T_ini + self._step_ms * steps
+
+    def initial(self) -> PeerMemory:
+        """The memory before the first message."""
+        return PeerMemory({name: PeerHistory() for name in self._indices})
+
+    def remember(
+        self,
+        memory: PeerMemory,
+        tick: int,
+        measurements: Iterable[tuple[str, Measurement]] = (),
+        plans: Iterable[tuple[str, Plan]] = (),
+    ) -> PeerMemory:
+        """Add messages that have arrived by world time `tick`; forget what is too old to matter.
+
+        The order of arrival does not matter. A message is refused and counted if it is a second one
+        for the same tick or step, comes from a robot that is no peer, is off the time grid or from
+        the future, is a plan of another horizon, or has implausible numbers (`is_plausible`).
+        """
+        peers, refused = dict(memory.peers), memory.refused
+        arrived: list[tuple[str, Measurement | Plan]] = [*measurements, *plans]
+        for robot, message in arrived:
+            history = peers.get(robot)
+            if history is None or not self._is_usable(message, tick):
+                refused += 1
+                continue
+            if isinstance(message, Plan):
+                held = _insert(history.plans, message, tick - self._span_ms, _by_serial)
+                refused += held is history.plans
+                peers[robot] = PeerHistory(history.measurements, held)
+            else:
+                known = _insert(history.measurements, message, tick - self._span_ms, _by_tick)
+                refused += known is history.measurements
+                peers[robot] = PeerHistory(known, history.plans)
+        return PeerMemory(peers, refused)
+
+    def _is_usable(self, message: Measurement | Plan, now: int) -> bool:
+        """Whether a message is of this time and grid, and has numbers that a robot can mean.
+
+        A peer's clock may lead by a little; messages far ahead would push out all real ones.
+        """
+        tick = message.tick
+        if isinstance(message, Plan):
+            of_step = message.step * self._step_ms == tick
+            on_grid = of_step and len(message.u) == self._config.planner.N
+        else:
+            on_grid = tick % SAMPLE_MS == 0
+        timely = now - self._span_ms <= tick <= now + self._step_ms
+        return timely and on_grid and is_plausible(self._config, message.u, message.y)
+
+    def are_ready(self, memory: PeerMemory, tick: int) -> bool:
+        """Whether the samples of all peers come at `tick`, and each stands or plans."""
+        recent = tick - patience(self._config) * self._step_ms
+        return all(
+            history.measurements
+            and tick - history.measurements[-1].tick <= MEASUREMENT.max_age_ms
+            and (
+                _stands(history.measurements[-1])
+                or (history.plans and history.plans[-1].tick >= recent)
+            )
+            for history in memory.peers.values()
+        )
+
+    def is_complete(self, memory: PeerMemory, serial: tuple[int, int]) -> bool:
+        """Whether every peer's plan of this step and exchange is there, and its window before it.
+
+        Args:
+            memory: what has been remembered.
+            serial: step and exchange, see `Plan.serial`.
+        """
+        end = serial[0] * self._step_ms
+        return all(
+            history.plans
+            and history.plans[-1].serial >= serial
+            and history.measurements
+            and history.measurements[-1].tick >= end
+            for history in memory.peers.values()
+        )
+
+    def lost_peers(self, memory: PeerMemory, last: int, first_step: int) -> tuple[str, ...]:
+        """Names of the peers given up, those that `select` would call lost."""
+        return tuple(
+            name
+            for name, history in memory.peers.items()
+            if self._judge(history, last, first_step)[0] == LOST
+        )
+
+    def select(
+        self, memory: PeerMemory, last: int, first_step: int, *, window_step: int | None = None
+    ) -> PeerSelection:
+        """Choose the plan and the window of each peer that a planning step uses.
+
+        Before its first plan has arrived a peer is assumed to have planned no deviation at step
+        first_step − 1, so that the first planning step needs nobody's plan.
+
+        Args:
+            memory: what has been remembered.
+            last: newest step whose plans and samples are looked at; with the one-step delay k−1.
+            first_step: the first planning step of the team, or since it walks again.
+            window_step: planning step at which the windows end: `last`, as in eq. 11, or a later
+                one, which moves windows and plans forward and takes samples not measured yet from
+                the plans.
+        """
+        end = last if window_step is None else window_step
+        config, planner, peers = self._config, self._config.planner, []
+        for name, index in self._indices.items():
+            history = memory.peers[name]
+            status, age, plans = self._judge(history, last, first_step)
+            window = self._window(index, history.measurements, plans, last, end)
+            du, step = np.zeros((planner.N, N_FORCES)), None
+            if plans:
+                step = plans[-1].step
+                stance = horizon_stance(config, index, step)
+                rest = (plans[-1].u - nominal_forces(stance, config.robot.weight))[
+                    planner.applied * (end - step) :
+                ]
+                du[: len(rest)] = rest
+            peers.append(PeerData(name, index, status, step, max(age, 0), *window, du))
+        return PeerSelection(tuple(peers), end)
+
+    def _judge(
+        self, history: PeerHistory, last: int, first_step: int
+    ) -> tuple[str, int, tuple[Plan, ...]]:
+        """Status of a peer at step `last`, the age of its newest plan, and its plans until then."""
+        oldest = first_step - patience(self._config)  # what is older was made before a stop
+        plans = tuple(plan for plan in history.plans if oldest <= plan.step <= last)
+        age = last - (plans[-1].step if plans else first_step - 1)
+        if age > patience(self._config) or self._has_stopped(history, plans, last):
+            return LOST, age, plans
+        return SILENT if age > self._config.planner.max_peer_age else USABLE, age, plans
+
+    def _has_stopped(self, history: PeerHistory, plans: tuple[Plan, ...], last: int) -> bool:
+        """Whether a peer has come to stand since its newest plan: it makes none any more."""
+        end = last * self._step_ms
+        sample = next((s for s in reversed(history.measurements) if s.tick <= end), None)
+        if not plans or sample is None:
+            return False
+        return sample.tick > plans[-1].tick and _stands(sample)
+
+    def _window(
+        self,
+        index: int,
+        samples: tuple[Measurement, ...],
+        plans: tuple[Plan, ...],
+        last: int,
+        end: int,
+    ) -> tuple[NDArray[np.bool_], Array, Array]:
+        """The T_ini samples that end at step `end`: measured, else as the peer planned them."""
+        T_ini, weight = self._config.planner.T_ini, self._config.robot.weight
+        starts = sample_starts(end * self._step_ms - SAMPLE_MS * T_ini, T_ini)
+        newest = last * self._step_ms
+        measured = {sample.tick - SAMPLE_MS: sample for sample in samples if sample.tick <= newest}
+        stance = scheduled_stance(self._config, index, starts)
+        known = np.ones(T_ini, dtype=np.bool_)
+        u, y = np.zeros((T_ini, N_FORCES)), np.zeros((T_ini, N_OUTPUTS))
+        for k, start in enumerate(starts.tolist()):
+            if (sample := measured.get(start)) is not None:
+                stance[k], u[k], y[k] = sample.stance > 0.5, sample.u, sample.y
+            elif (planned := _plan_at(plans, start)) is not None:
+                u[k], y[k] = planned
+            else:
+                known[k] = False
+        du = u - nominal_forces(stance, weight)
+        du[~known] = 0.0
+        return known, du, y
+
+
+def _plan_at(plans: tuple[Plan, ...], start: int) -> tuple[Array, Array] | None:
+    """Forces and outputs that the newest plan has for the sample which begins at a tick."""
+    for plan in reversed(plans):
+        ahead = (start - plan.tick) // SAMPLE_MS
+        if 0 <= ahead < len(plan.u):
+            return plan.u[ahead], plan.y[ahead]
+    return None
+
+
+def _stands(sample: Measurement) -> bool:
+    """Whether a peer stands on all four feet."""
+    return bool((sample.stance > 0.5).all())
+
+
+def _by_tick(measurement: Measurement) -> int:
+    return measurement.tick
+
+
+def _by_serial(plan: Plan) -> tuple[int, int]:
+    return plan.serial
+
+
+def _insert(held: tuple[M, ...], new: M, oldest: int, order: Callable[[M], Any]) -> tuple[M, ...]:
+    """`held` with `new` sorted in, without what is older; `held` itself if it has `new` already."""
+    place: int = bisect_left(held, order(new), key=order)
+    if place < len(held) and order(held[place]) == order(new):
+        return held
+    kept = [item for item in held[:place] if item.tick >= oldest]
+    return (*kept, new, *held[place:])

@@ -1,0 +1,266 @@
+"""The team's planner: one QP over all robots' forces, of eq. 7 or of DeePC (eq. 5).
+
+DeePC's g, σ and y are eliminated exactly, which leaves a QP in the future inputs alone.
+
+    min Σ ‖y − y_des‖²_Q + ‖u‖²_R + λ_g ‖g‖² + λ_σ ‖σ‖²
+    s.t. [U_p; Y_p; U_f; Y_f] g + [0; σ; 0; 0] = [u_ini; y_ini; u; y],   u in its set
+
+Of the data's `Reduction`, b + [σ; 0] = Φ a + M z with a = [u_ini; u] and b = [y_ini; y], z is
+unconstrained. So it is a linear map of t = [y_ini; y_des] − Φ a, and with Ω = diag(λ_σ, Q) what
+remains is
+
+    tᵀ Λ t + λ_g aᵀ S_aa⁻¹ a + ‖u‖²_R,   Λ = Ω − Ω M (λ_g I + Mᵀ Ω M)⁻¹ Mᵀ Ω
+
+This holds for data without noise too; their M has only as many columns as the plant has states.
+With a small λ_g, z alone meets any y_des and the inputs have no effect. A large λ_g draws the
+inputs, through aᵀ S_aa⁻¹ a, towards those that followed such a past in the data. Both are
+properties of eq. 5 itself. g, σ and S belong to scaled signals, all else is in physical units; of a
+team of robots these are deviations in N, m, m/s, rad, rad/s. Bounds on y would constrain z: with
+them this is no longer the paper's problem.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from quadriga.agents.gait import nominal_forces
+from quadriga.agents.planner.planner import PlannerInputs
+from quadriga.agents.planner.qp import (
+    NO_BOUNDS,
+    Condensed,
+    PlannerProblem,
+    Residuals,
+    condense,
+    constrain,
+    stance_columns,
+    unpack,
+)
+from quadriga.agents.planner.solver import NOMINAL, SOLVED, SOLVERS, DaqpSolver
+from quadriga.agents.predictor.episode import Episode, Layout, team_layout
+from quadriga.agents.predictor.predictor import Predictor, check_sizes
+from quadriga.agents.predictor.regression import Reduction, reduce
+from quadriga.agents.time_grid import horizon_stance, phase_of, walking_steps
+from quadriga.shared.codes import with_detail
+from quadriga.shared.config.sections import Config, PlannerConfig
+from quadriga.shared.errors import ConfigError
+from quadriga.shared.robots.conventions import N_LEGS, Array
+
+Collected = Callable[[], Sequence[Episode]]
+Formulation = Callable[[int, NDArray[np.bool_]], Condensed]  # of contact phase and stance
+
+
+@dataclass(frozen=True, slots=True)
+class TeamResult:
+    """Plans of all robots of one planning step, always usable.
+
+    Attributes:
+        status: "solved", or "nominal:<reason>".
+        u: forces, swing legs exactly zero, (n, N, 12), N.
+        y: predicted outputs, (n, N, 6).
+        residuals: optimality of the QP's solution.
+    """
+
+    status: str
+    u: Array
+    y: Array
+    residuals: Residuals
+
+
+class TeamPlanner:
+    """Immutable set-up of the team's planner; `step` depends on its arguments alone.
+
+    Args:
+        config: the team's configuration.
+        formulation: cost and prediction for a contact phase and the team's stance (N n, 4).
+        phases: how many contact phases there are.
+    """
+
+    def __init__(self, config: Config, formulation: Formulation, phases: int = 1) -> None:
+        self._config, self._formulation, self._phases = config, formulation, phases
+        # One factorised problem per phase and stance pattern: a memo, it changes no result.
+        self._problems: dict[tuple[int, bytes], tuple[PlannerProblem, DaqpSolver]] = {}
+        for step in walking_steps(config):
+            self._problem(step, self._stance(step))
+
+    def step(self, inputs: Sequence[PlannerInputs]) -> TeamResult:
+        """Plan the horizon of one planning step for all robots.
+
+        Args:
+            inputs: of all robots in their order, of one step.
+        """
+        n, N = len(inputs), self._config.planner.N
+        stance = self._stance(inputs[0].step)
+        problem, solver = self._problem(inputs[0].step, stance)
+        past = np.concatenate([robot.past() for robot in inputs])
+        base = np.concatenate([robot.y_base for robot in inputs])
+        y_des = np.concatenate([robot.y_des for robot in inputs]).ravel() - base.ravel()
+        y_free = problem.condensed.free(past, y_des)
+        solution = solver.solve(problem.linear_term(past, y_des), y_free - y_des)
+        du, dy = unpack(problem, solution.x, y_free)
+        return TeamResult(
+            SOLVED if solution.status == SOLVED else with_detail(NOMINAL, solution.status),
+            (nominal_forces(stance, self._config.robot.weight) + du).reshape(n, N, -1),
+            (base + dy).reshape(n, N, -1),
+            solution.residuals,
+        )
+
+    def _stance(self, step: int) -> NDArray[np.bool_]:
+        robots = range(self._config.team.robots)
+        return np.concatenate([horizon_stance(self._config, i, step) for i in robots])
+
+    def _problem(self, step: int, stance: NDArray[np.bool_]) -> tuple[PlannerProblem, DaqpSolver]:
+        key = phase_of(self._config, step, self._phases), stance.tobytes()
+        entry = self._problems.get(key)
+        if entry is None:
+            condensed = self._formulation(key[0], stance)
+            problem = constrain(self._config.planner, self._config.robot.weight, condensed, stance)
+            entry = problem, SOLVERS[self._config.planner.solver](problem)
+            self._problems[key] = entry
+        return entry
+
+
+def build_centralised(
+    config: Config, predictor: Predictor, _collected: Collected | None = None
+) -> TeamPlanner:
+    """The planner of eq. 7: the transition matrix of the whole team.
+
+    Raises:
+        PredictorError: the predictor's sizes are not the configuration's.
+    """
+    check_sizes(config, predictor)
+    past = predictor.meta.past
+
+    def formulation(phase: int, stance: NDArray[np.bool_]) -> Condensed:
+        robots = range(config.team.robots)
+        columns = [np.concatenate([predictor.block(i, j, phase) for i in robots]) for j in robots]
+        G_past = np.concatenate([column[:, :past] for column in columns], axis=1)
+        G_u = np.concatenate([column[:, past:] for column in columns], axis=1)
+        return condense(config.planner, G_past, G_u, stance)
+
+    return TeamPlanner(config, formulation, predictor.phases)
+
+
+def build_deepc(config: Config, _predictor: Predictor | None, collected: Collected) -> TeamPlanner:
+    """The planner of eq. 5 with g and σ eliminated, from the collected episodes.
+
+    Raises:
+        ConfigError: output bounds, which the elimination of g does not allow.
+    """
+    planner = config.planner
+    if planner.output_bounds != NO_BOUNDS:
+        raise ConfigError(
+            "planner.output_bounds",
+            repr(planner.output_bounds),
+            repr(NO_BOUNDS),
+            'with planner.kind = "deepc" the outputs are eliminated together with g',
+        )
+    layout = team_layout(config.team.robots, planner.T_ini, planner.N)
+    model = build_model(reduce(collected(), layout), planner)
+    return TeamPlanner(config, lambda _, stance: select(model, stance_columns(stance)))
+
+
+def build_model(reduction: Reduction, config: PlannerConfig) -> Condensed:
+    """The problem of eq. 5 in all 12 n N forces of the team; `select` keeps those of stance legs.
+
+    Args:
+        reduction: of the team's data.
+        config: weights.
+    """
+    Q, R = np.array(config.Q), np.tile(config.R, N_LEGS)
+    return eliminate(reduction, Q, R, config.lambda_g, config.lambda_sigma)
+
+
+def eliminate(
+    reduction: Reduction, Q: Array, R: Array, lambda_g: float, lambda_sigma: Array | float
+) -> Condensed:
+    """Eliminate g, σ and y of eq. 5.
+
+    Past and y are stacked agent by agent; rows and columns of each agent are ordered as in a
+    `Predictor`. The predicted y is drawn towards y_des, because eq. 5 lets g choose among the
+    trajectories that the data allow.
+
+    Args:
+        reduction: of the data.
+        Q: weights of the outputs of one sample of one agent, physical, positive, shape (p,).
+        R: of its inputs, likewise, shape (m,).
+        lambda_g: λ_g, positive.
+        lambda_sigma: λ_σ, of scaled outputs, positive, or one for each output, shape (p,).
+
+    Returns:
+        The problem in all m n N future inputs.
+    """
+    layout, M = reduction.layout, reduction.spread
+    n, T_ini, N = layout.agents, layout.T_ini, layout.N
+    m_p, p_p = n * layout.inputs * T_ini, n * layout.outputs * T_ini
+    y_scale = np.tile(layout.y_scale, n * N)
+    root = np.sqrt(
+        np.concatenate(
+            [
+                np.tile(lambda_sigma * np.ones(layout.outputs), n * T_ini),
+                np.tile(Q, n * N) * y_scale**2,
+            ]
+        )
+    )
+
+    # z = C⁻ᵀ Z √Ω t and Λ = √Ω (I − Zᵀ Z) √Ω with C Cᵀ = λ_g I + Mᵀ Ω M and Z = C⁻¹ Mᵀ √Ω.
+    weighted = root[:, None] * M
+    C = linalg.cholesky(lambda_g * np.eye(M.shape[1]) + weighted.T @ weighted, lower=True)
+    Z = linalg.solve_triangular(C, weighted.T, lower=True)
+    chosen = linalg.solve_triangular(C, M[p_p:].T, lower=True).T @ Z * root  # [0 I] M z = chosen t
+    Lambda = root[:, None] * (np.eye(len(root)) - Z.T @ Z) * root
+
+    T_past, T_des, B = _residual(reduction)
+    u_all = np.tile(layout.u_scale, n * (T_ini + N))
+    effort = lambda_g / np.outer(u_all[m_p:], u_all) * reduction.inverse[m_p:]
+    gradient = B.T @ Lambda
+    H = gradient @ B + effort[:, m_p:]
+    H.flat[:: len(H) + 1] += np.tile(R, n * N)
+    past_u, _ = _past_columns(layout)
+    F_past, Y_past = -gradient @ T_past, chosen @ T_past
+    F_past[:, past_u] += effort[:, :m_p]
+    Y_past[:, past_u] += reduction.response[p_p:, :m_p] / u_all[:m_p]
+    return Condensed(
+        H=0.5 * (H + H.T),
+        F_past=F_past,
+        F_des=-gradient @ T_des,
+        Y_v=y_scale[:, None] * (B[p_p:] - chosen @ B),
+        Y_past=y_scale[:, None] * Y_past,
+        Y_des=y_scale[:, None] * (chosen @ T_des),
+    )
+
+
+def select(model: Condensed, columns: NDArray[np.int64]) -> Condensed:
+    """The same problem with all forces but `columns` zero: exact for legs that swing."""
+    return Condensed(
+        H=model.H[np.ix_(columns, columns)],
+        F_past=model.F_past[columns],
+        F_des=model.F_des[columns],
+        Y_v=np.ascontiguousarray(model.Y_v[:, columns]),
+        Y_past=model.Y_past,
+        Y_des=model.Y_des,
+    )
+
+
+def _residual(reduction: Reduction) -> tuple[Array, Array, Array]:
+    """T = T_past @ past + T_des @ y_des − B u: scaled t, physical past, y_des and u."""
+    layout, response = reduction.layout, reduction.response
+    n, T_ini, N = layout.agents, layout.T_ini, layout.N
+    m_p, p_p, p_f = n * layout.inputs * T_ini, n * layout.outputs * T_ini, n * layout.rows
+    past_u, past_y = _past_columns(layout)
+    T_past, T_des = np.zeros((p_p + p_f, m_p + p_p)), np.zeros((p_p + p_f, p_f))
+    T_past[:, past_u] = -response[:, :m_p] / np.tile(layout.u_scale, n * T_ini)
+    T_past[np.arange(p_p), past_y] = 1.0 / np.tile(layout.y_scale, n * T_ini)
+    T_des[p_p:] = np.diag(1.0 / np.tile(layout.y_scale, n * N))
+    return T_past, T_des, response[:, m_p:] / np.tile(layout.u_scale, n * N)
+
+
+def _past_columns(layout: Layout) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Places of all agents' u_ini and of their y_ini in past."""
+    index = np.arange(layout.agents * layout.past).reshape(layout.agents, -1)
+    inputs = layout.inputs * layout.T_ini
+    return index[:, :inputs].ravel(), index[:, inputs:].ravel()
