@@ -13,23 +13,23 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from quadriga.agents.controller.controller import control
+from quadriga.agents.controller.trunk import TrunkCommand
 from quadriga.agents.controller.whole_body_qp import WholeBodySolution
 from quadriga.agents.counters import count
 from quadriga.agents.estimator.estimator import estimate, truth_row
-from quadriga.agents.estimator.robot_state import RobotState, Schedule, gains_row
+from quadriga.agents.estimator.robot_state import RobotState, gains_row
+from quadriga.agents.gait import Gait, Schedule
 from quadriga.agents.modes import ModeRules, Resume, Statuses, newest_statuses, ramp
 from quadriga.agents.planner.solver import SolvedQp
 from quadriga.agents.planner.team import Collected
-from quadriga.agents.planning.active_plan import setpoint_at
+from quadriga.agents.planning.active_plan import Setpoint, setpoint_at
 from quadriga.agents.planning.interface import Expected, PlanningInputs
 from quadriga.agents.planning.references import reference_at, remember_references
 from quadriga.agents.planning.registry import PlanningState, build_planning
 from quadriga.agents.predictor.predictor import Predictor
-from quadriga.agents.schedules import Schedules
 from quadriga.agents.stand_up import StandUp, StandUpRules
 from quadriga.agents.step_io import Inputs as Inputs
 from quadriga.agents.step_io import Outputs as Outputs
-from quadriga.agents.tasks import Tasks
 from quadriga.agents.validate import Validator
 from quadriga.shared.codes import with_detail
 from quadriga.shared.config.sections import Config
@@ -41,6 +41,7 @@ from quadriga.shared.modes import (
     STAND,
     STOPPED,
     STOPPING,
+    WALK,
     Mode,
     Stop,
     resolve_stops,
@@ -127,8 +128,10 @@ class Agent:
         self._height = config.reference.height
         self._modes, self._stand_up = ModeRules(config, robot), StandUpRules(config)
         self._validator = Validator(config, self.index)
-        self._schedules = Schedules(config, self.index)
-        self._tasks = Tasks(config)
+        self._gait = Gait(config, self.index)
+        self._feedforward = config.planner.interface == "feedforward"
+        # Planned height and tilt are in general not tracked: the reference would follow the error.
+        self._tracks_all = not self._feedforward and config.planner.tracked == "outputs"
         self._fallen_cosine = math.cos(config.controller.fall_tilt)
         self._damping = config.controller.damping
         self._max_failures = config.controller.max_failures
@@ -183,7 +186,7 @@ class Agent:
         if read.lost:
             stops.append(Stop(STAND, read.lost))
 
-        schedule = self._schedules.at(tick, mode)
+        schedule = self._gait.at(tick, mode)
         robot = self._estimate(state, inputs, schedule, dt)
         if not robot.upright >= self._fallen_cosine:
             stops.append(Stop(PASSIVE, NO_ESTIMATE if math.isnan(robot.upright) else FALL))
@@ -195,7 +198,7 @@ class Agent:
             stops.append(Stop(STOPPING, planned.stop_reason))
 
         setpoint = setpoint_at(planning.plans, tick)
-        trunk = self._tasks.build(tick, mode, reference, setpoint, inputs.excitation)
+        trunk = self._trunk_command(tick, mode, reference, setpoint, inputs.excitation)
         new_sample = tick // SAMPLE_MS != state.tick // SAMPLE_MS
         controlled, solution = control(robot, trunk, self._gains, new_sample=new_sample)
         failures = 0 if solution.solved else state.failures + 1
@@ -289,8 +292,31 @@ class Agent:
         begun = tick - SAMPLE_MS
         if tick % SAMPLE_MS or begun < 0 or begun > state.tick:
             return None
-        stance = self._schedules.at(begun, state.mode).stance
+        stance = self._gait.at(begun, state.mode).stance
         return Measurement(tick, tick * 1_000_000, robot.mean_planned_force, robot.outputs, stance)
+
+    def _trunk_command(
+        self,
+        tick: int,
+        mode: Mode,
+        reference: Reference,
+        setpoint: Setpoint,
+        excitation: Array | None,
+    ) -> TrunkCommand:
+        """What the controller is asked: the reference, with what the plan in force says of it."""
+        deviation, planned = setpoint.deviation, setpoint.y_ref
+        if excitation is not None:
+            deviation = deviation + excitation
+        if mode.name != WALK:
+            deviation = np.zeros(12)
+        share = mode.speed_factor(tick)
+        vx, vy, wz = share * reference.vx, share * reference.vy, share * reference.wz
+        height, roll, pitch = reference.height, 0.0, 0.0
+        if planned is not None and not self._feedforward:
+            vx, vy = float(planned[1]), float(planned[2])
+            if self._tracks_all:
+                height, _, _, roll, pitch, wz = map(float, planned)
+        return TrunkCommand(vx, vy, wz, height, deviation, self._feedforward, roll, pitch)
 
     def _command(self, tick: int, tau: Array, mode: Mode, *, solved: bool) -> Command:
         """The motor command: torques, with damping where they are not this tick's, or damping."""

@@ -8,13 +8,13 @@ from typing import Final
 
 import numpy as np
 
+from quadriga.agents.gait import step_ms
 from quadriga.agents.planner.solver import SOLVED
 from quadriga.agents.planner.team import TeamPlanner
 from quadriga.agents.planning.central import Central, CentralOutputs, CentralState
 from quadriga.agents.planning.interface import REFUSED
 from quadriga.agents.plausibility import is_within_limits
 from quadriga.agents.rehearsal import rehearse_central
-from quadriga.agents.time_grid import step_ms
 from quadriga.shared.bus.discovery import ProcessInfo, join
 from quadriga.shared.bus.liveness import Liveness
 from quadriga.shared.bus.session import POLL, READY, Bus

@@ -11,9 +11,8 @@ from typing import Final
 import numpy as np
 
 from quadriga.agents.agent import Agent, AgentState, Inputs
-from quadriga.agents.gait import nominal_forces, scheduled_stance
+from quadriga.agents.gait import first_step, nominal_forces, scheduled_stance, step_ms
 from quadriga.agents.planning.central import Central, CentralState
-from quadriga.agents.time_grid import first_step, step_ms
 from quadriga.agents.validate import AGREES_MS, standing_torques
 from quadriga.shared.codec import decode, encode
 from quadriga.shared.config.sections import Config

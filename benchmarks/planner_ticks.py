@@ -7,12 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from quadriga.agents.gait import nominal_forces
+from quadriga.agents.gait import horizon_stance, nominal_forces, step_ms
 from quadriga.agents.planner.peers import USABLE, PeerData, PeerSelection
 from quadriga.agents.planner.planner import PlannerInputs
 from quadriga.agents.predictor.episode import commanded_outputs, output_base
 from quadriga.agents.predictor.predictor import Predictor
-from quadriga.agents.time_grid import horizon_stance, step_ms
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.config.sections import Config
 from quadriga.shared.messages import Measurement, Plan, Reference

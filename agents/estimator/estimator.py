@@ -19,7 +19,8 @@ from quadriga.agents.estimator.filter import (
 from quadriga.agents.estimator.foot_load import forget_foot_load, update_foot_load
 from quadriga.agents.estimator.kinematics import leg_kinematics, roll_pitch_yaw, rotation_matrix
 from quadriga.agents.estimator.payload_friction import update_payload
-from quadriga.agents.estimator.robot_state import GAINS, ROBOT_STATE, RobotState, Schedule
+from quadriga.agents.estimator.robot_state import GAINS, ROBOT_STATE, RobotState
+from quadriga.agents.gait import Schedule
 from quadriga.shared.messages import State, Truth
 from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.jit import compiled

@@ -7,7 +7,7 @@ array. `row.view(ROBOT_STATE)[0]` names its parts, `state.contact[leg]`, there a
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field, fields
+from dataclasses import fields
 from typing import Any, ClassVar, Final
 
 import numpy as np
@@ -211,23 +211,3 @@ class RobotState(RecordRow):
         """Mean of the planned forces so far in the present sample, (12,), N, yaw frame."""
         mean: Array = self.force_sum / max(1.0, self.force_count)
         return mean
-
-
-@record
-class Schedule:
-    """The gait at one tick.
-
-    Attributes:
-        stance: scheduled stance, (4,), 1 or 0.
-        progress: progress of the half cycle in [0, 1).
-        half_cycle: its number; −1: the robot stands on four feet.
-        row: all of it, (6,).
-    """
-
-    stance: Array
-    progress: float
-    half_cycle: int
-    row: Array = field(init=False, repr=False, compare=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "row", np.array([*self.stance, self.progress, self.half_cycle]))

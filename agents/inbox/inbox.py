@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any, Final
 
+from quadriga.agents.gait import step_ms
 from quadriga.agents.planning.interface import NOTHING, Expected
 from quadriga.agents.planning.references import AHEAD_MS
 from quadriga.agents.plausibility import (
@@ -15,7 +16,6 @@ from quadriga.agents.plausibility import (
     measured_limits,
 )
 from quadriga.agents.step_io import Inputs
-from quadriga.agents.time_grid import step_ms
 from quadriga.shared.codec import decode
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError

@@ -43,6 +43,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 from scipy.sparse.linalg import eigsh
 
+from quadriga.agents.gait import distinct_steps, horizon_stance, phase_of
 from quadriga.agents.planner.qp import (
     NO_BOUNDS,
     Condensed,
@@ -51,7 +52,6 @@ from quadriga.agents.planner.qp import (
     stance_columns,
 )
 from quadriga.agents.predictor.predictor import Predictor
-from quadriga.agents.time_grid import distinct_steps, horizon_stance, phase_of
 from quadriga.shared.config.sections import Config
 from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.robots.conventions import N_OUTPUTS, Array

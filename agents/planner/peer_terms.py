@@ -8,6 +8,7 @@ from dataclasses import field
 import numpy as np
 from numpy.typing import NDArray
 
+from quadriga.agents.gait import horizon_stance, phase_of, place_in, walking_steps
 from quadriga.agents.planner.cooperation import (
     brings_forward,
     is_cooperative,
@@ -17,7 +18,6 @@ from quadriga.agents.planner.cooperation import (
 from quadriga.agents.planner.peers import USABLE, PeerSelection
 from quadriga.agents.planner.qp import stance_columns
 from quadriga.agents.predictor.predictor import Predictor
-from quadriga.agents.time_grid import horizon_stance, phase_of, place_in, walking_steps
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robots.conventions import N_OUTPUTS, Array
 from quadriga.shared.runtime.record import record

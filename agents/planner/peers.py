@@ -14,9 +14,15 @@ from typing import Any, Final, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from quadriga.agents.gait import nominal_forces, scheduled_stance
+from quadriga.agents.gait import (
+    horizon_stance,
+    nominal_forces,
+    patience,
+    sample_starts,
+    scheduled_stance,
+    step_ms,
+)
 from quadriga.agents.plausibility import is_plausible
-from quadriga.agents.time_grid import horizon_stance, patience, sample_starts, step_ms
 from quadriga.shared.config.sections import Config
 from quadriga.shared.messages import Measurement, Plan
 from quadriga.shared.robots.conventions import N_FORCES, N_OUTPUTS, Array, robot_names

@@ -7,7 +7,14 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quadriga.agents.gait import nominal_forces, nominal_table
+from quadriga.agents.gait import (
+    horizon_stance,
+    nominal_forces,
+    nominal_table,
+    phase_of,
+    place_in,
+    walking_steps,
+)
 from quadriga.agents.planner.cooperation import (
     build_team_problem,
     is_cooperative,
@@ -29,7 +36,6 @@ from quadriga.agents.planner.solver import (
 )
 from quadriga.agents.plausibility import OUTPUT_MAX, are_plausible_outputs
 from quadriga.agents.predictor.predictor import Predictor, check_sizes
-from quadriga.agents.time_grid import horizon_stance, phase_of, place_in, walking_steps
 from quadriga.shared.codes import with_detail
 from quadriga.shared.config.sections import Config
 from quadriga.shared.modes import PEER_LOST

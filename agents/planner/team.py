@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from quadriga.agents.gait import nominal_forces
+from quadriga.agents.gait import horizon_stance, nominal_forces, phase_of, walking_steps
 from quadriga.agents.planner.planner import PlannerInputs
 from quadriga.agents.planner.qp import (
     NO_BOUNDS,
@@ -44,7 +44,6 @@ from quadriga.agents.planner.solver import NOMINAL, SOLVED, SOLVERS, DaqpSolver
 from quadriga.agents.predictor.episode import Episode, Layout, team_layout
 from quadriga.agents.predictor.predictor import Predictor, check_sizes
 from quadriga.agents.predictor.regression import Reduction, reduce
-from quadriga.agents.time_grid import horizon_stance, phase_of, walking_steps
 from quadriga.shared.codes import with_detail
 from quadriga.shared.config.sections import Config, PlannerConfig
 from quadriga.shared.errors import ConfigError

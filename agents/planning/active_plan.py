@@ -8,8 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from quadriga.agents.gait import nominal_forces, scheduled_stance
-from quadriga.agents.time_grid import sample_starts, step_ms
+from quadriga.agents.gait import nominal_forces, sample_starts, scheduled_stance, step_ms
 from quadriga.shared.config.sections import Config, PlannerConfig
 from quadriga.shared.messages import Plan
 from quadriga.shared.robots.conventions import N_FORCES, N_LEGS, N_OUTPUTS, Array

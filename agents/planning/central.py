@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
+from quadriga.agents.gait import first_step, step_ms
 from quadriga.agents.planner.team import TeamPlanner
 from quadriga.agents.planning.references import build_planner_inputs, remember_references
 from quadriga.agents.plausibility import is_plausible
-from quadriga.agents.time_grid import first_step, step_ms
 from quadriga.shared.config.sections import Config
 from quadriga.shared.messages import Measurement, Plan, Reference
 from quadriga.shared.robots.conventions import robot_names

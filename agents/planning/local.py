@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import field, replace
 from typing import Final
 
+from quadriga.agents.gait import exchange_ms, first_due_step, first_step, patience, step_ms
 from quadriga.agents.planner.cooperation import brings_forward, coupled_peers
 from quadriga.agents.planner.peer_terms import PeerTerms
 from quadriga.agents.planner.peers import Neighbours, PeerMemory
@@ -21,7 +22,6 @@ from quadriga.agents.planning.interface import (
 )
 from quadriga.agents.planning.references import base_of_window, build_planner_inputs, is_gapless
 from quadriga.agents.predictor.predictor import Predictor
-from quadriga.agents.time_grid import exchange_ms, first_due_step, first_step, patience, step_ms
 from quadriga.shared.codes import with_detail
 from quadriga.shared.config.sections import Config
 from quadriga.shared.messages import Measurement, Plan

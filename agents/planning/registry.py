@@ -12,6 +12,7 @@ import numpy as np
 # what an agent's behaviour depends on finds these.
 import quadriga.agents.planning.local
 import quadriga.agents.planning.remote  # noqa: F401
+from quadriga.agents.gait import step_ms
 from quadriga.agents.planner.solver import NOMINAL, SolvedQp
 from quadriga.agents.planner.team import Collected
 from quadriga.agents.planning.active_plan import ActivePlan, PlanCheck, add_plan
@@ -24,7 +25,6 @@ from quadriga.agents.planning.interface import (
 from quadriga.agents.planning.references import reference_at
 from quadriga.agents.predictor.episode import commanded_outputs
 from quadriga.agents.predictor.predictor import Predictor
-from quadriga.agents.time_grid import step_ms
 from quadriga.shared.codes import with_detail
 from quadriga.shared.config.sections import Config
 from quadriga.shared.messages import Plan

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from quadriga.agents.gait import first_due_step, first_step, patience, step_ms
 from quadriga.agents.planning.active_plan import FADED, ActivePlan, PlanCheck, trust_scaling
 from quadriga.agents.planning.interface import (
     NOTHING,
@@ -15,7 +16,6 @@ from quadriga.agents.planning.interface import (
 )
 from quadriga.agents.planning.references import reference_at
 from quadriga.agents.predictor.episode import commanded_outputs
-from quadriga.agents.time_grid import first_due_step, first_step, patience, step_ms
 from quadriga.shared.config.sections import Config
 from quadriga.shared.messages import Measurement, Plan
 from quadriga.shared.modes import PLANNER_LOST, WALK

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 from scipy.special import stdtrit
 
+from quadriga.agents.gait import distinct_steps, horizon_stance, phase_of, walking_steps
 from quadriga.agents.planner.cooperation import (
     OWN,
     TEAM,
@@ -30,7 +31,6 @@ from quadriga.agents.predictor.episode import Episode
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.predictor.regression import scaled_blocks
 from quadriga.agents.predictor.store import REMEDY, load, not_a_predictor
-from quadriga.agents.time_grid import distinct_steps, horizon_stance, phase_of, walking_steps
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError, PredictorFileError
 from quadriga.shared.planner_kinds import find_kind

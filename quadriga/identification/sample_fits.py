@@ -8,11 +8,10 @@ from typing import Final
 
 import numpy as np
 
-from quadriga.agents.gait import nominal_forces, scheduled_stance
+from quadriga.agents.gait import nominal_forces, sample_starts, scheduled_stance
 from quadriga.agents.predictor.episode import U_SCALE, Y_SCALE, Episode
 from quadriga.agents.predictor.gates import coupling_table, run_gates
 from quadriga.agents.predictor.predictor import KINDS, PredictorMeta, fit
-from quadriga.agents.time_grid import sample_starts
 from quadriga.identification.behaviour import numbers
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config

@@ -8,9 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from quadriga.agents.gait import nominal_forces, scheduled_stance
+from quadriga.agents.gait import nominal_forces, scheduled_stance, step_ms
 from quadriga.agents.planner.solver import SOLVED
-from quadriga.agents.time_grid import step_ms
 from quadriga.report.run import ReportedRun
 from quadriga.report.samples import Samples, find_slip
 from quadriga.report.window import (

@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 from matplotlib.figure import Figure
 
+from quadriga.agents.gait import step_ms
 from quadriga.agents.planning.active_plan import FADED
-from quadriga.agents.time_grid import step_ms
 from quadriga.charts.colours import BARS, broad_style, robot_style
 from quadriga.charts.draw import draw_panels
 from quadriga.charts.panels import Bars, Curve, Mark, Panel, PanelGrid

@@ -9,8 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from quadriga.agents.gait import scheduled_stance
-from quadriga.agents.time_grid import gait_phase, horizon_stance, phase_of, walking_steps
+from quadriga.agents.gait import (
+    gait_phase,
+    horizon_stance,
+    phase_of,
+    scheduled_stance,
+    walking_steps,
+)
 from quadriga.shared.config.sections import Config
 
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from benchmarks.as_written import DEFAULT, TIGHT, PaperQp
-from quadriga.agents.time_grid import horizon_stance
+from quadriga.agents.gait import horizon_stance
 from quadriga.shared.config.sections import Config, PlannerConfig
 from quadriga.shared.robots.conventions import Array
 from tests.a1 import build_problem, nominal_forces

@@ -12,7 +12,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from quadriga.agents.gait import nominal_forces
+from quadriga.agents.gait import first_step, horizon_stance, nominal_forces, step_ms
 from quadriga.agents.planning.active_plan import ActivePlan, setpoint_at
 from quadriga.agents.planning.interface import (
     Expected,
@@ -22,7 +22,6 @@ from quadriga.agents.planning.interface import (
 )
 from quadriga.agents.planning.registry import build_planning
 from quadriga.agents.predictor.predictor import Predictor
-from quadriga.agents.time_grid import first_step, horizon_stance, step_ms
 from quadriga.experiments.trial.sample_trials import sample_predictor
 from quadriga.identification.central_planner import choose_central_planner
 from quadriga.identification.rollout import Rollout

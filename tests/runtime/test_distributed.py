@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from quadriga.agents.time_grid import horizon_stance
+from quadriga.agents.gait import horizon_stance
 from quadriga.identification.predictors import ensure_predictor
 from quadriga.replay.team_replay import replay
 from quadriga.shared.config.load import load

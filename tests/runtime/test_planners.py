@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
+from quadriga.agents.gait import first_step, step_ms
 from quadriga.agents.planning.references import AHEAD_MS
 from quadriga.agents.predictor.gates import load_checked as load_predictor
-from quadriga.agents.time_grid import first_step, step_ms
 from quadriga.identification.central_planner import build_central_planner
 from quadriga.identification.predictors import ensure_predictor
 from quadriga.identification.rollout import Rollout

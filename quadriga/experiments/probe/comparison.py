@@ -8,8 +8,8 @@ from typing import Final
 
 import numpy as np
 
+from quadriga.agents.gait import gait_phase
 from quadriga.agents.predictor.predictor import Predictor
-from quadriga.agents.time_grid import gait_phase
 from quadriga.experiments.probe.pulses import DIRECTIONS
 from quadriga.experiments.probe.responses import Responses
 from quadriga.shared.config.sections import GaitConfig

@@ -7,8 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from quadriga.agents.gait import scheduled_stance
-from quadriga.agents.time_grid import step_ms, walking_steps
+from quadriga.agents.gait import scheduled_stance, step_ms, walking_steps
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robots.conventions import N_LEGS, Array
 

@@ -9,9 +9,9 @@ from typing import Final
 
 import numpy as np
 
+from quadriga.agents.gait import step_ms
 from quadriga.agents.planner.cooperation import is_cooperative
 from quadriga.agents.planner.solver import SOLVED
-from quadriga.agents.time_grid import step_ms
 from quadriga.recordings.checks.finding import CheckedMessage, Finding
 from quadriga.shared.config.sections import Config
 from quadriga.shared.messages import Plan, Status

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from quadriga.agents.time_grid import horizon_stance
+from quadriga.agents.gait import horizon_stance
 from quadriga.recordings.checks.finding import CheckedMessage, Finding
 from quadriga.recordings.checks.getting_up import Doubts, GettingUp
 from quadriga.shared.config.sections import Config

@@ -17,7 +17,8 @@ from quadriga.agents.controller.controller import control
 from quadriga.agents.controller.trunk import TrunkCommand
 from quadriga.agents.controller.whole_body_qp import WholeBodySolution
 from quadriga.agents.estimator.estimator import estimate
-from quadriga.agents.estimator.robot_state import RobotState, Schedule, gains_row
+from quadriga.agents.estimator.robot_state import RobotState, gains_row
+from quadriga.agents.gait import Schedule
 from quadriga.shared.config.sections import Config, GaitConfig, PlannerConfig, TeamConfig
 from quadriga.shared.messages import Reference, State
 from quadriga.shared.robots.conventions import GRAVITY, Array

@@ -20,7 +20,8 @@ from quadriga.agents.estimator.filter import (
     take_imu_error_off,
     update_imu_error,
 )
-from quadriga.agents.estimator.robot_state import Schedule, gains_row
+from quadriga.agents.estimator.robot_state import gains_row
+from quadriga.agents.gait import Schedule
 from quadriga.shared.config.sections import Config
 from quadriga.shared.messages import State, Truth
 from quadriga.shared.robots.conventions import GRAVITY, N_JOINTS, Array

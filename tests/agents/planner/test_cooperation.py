@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import linalg
 
+from quadriga.agents.gait import horizon_stance, walking_steps
 from quadriga.agents.planner.cooperation import (
     cooperative_radius,
     coupled_peers,
@@ -27,7 +28,6 @@ from quadriga.agents.planner.planner import Planner, PlannerInputs
 from quadriga.agents.planner.team import build_centralised
 from quadriga.agents.predictor.gates import are_same_costs, iteration_radius, probe_costs, run_gates
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
-from quadriga.agents.time_grid import horizon_stance, walking_steps
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError, PredictorError

@@ -14,12 +14,12 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from benchmarks.as_written import TIGHT, DeepcQp
+from quadriga.agents.gait import horizon_stance
 from quadriga.agents.planner.qp import Condensed, PlannerProblem, constrain
 from quadriga.agents.planner.team import build_model, select
 from quadriga.agents.predictor.episode import U_SCALE, Y_SCALE, Episode, team_layout
 from quadriga.agents.predictor.hankel import hankel
 from quadriga.agents.predictor.regression import Reduction, reduce
-from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config, PlannerConfig
 from quadriga.shared.robots.conventions import Array
 from tests.a1 import WEIGHT, nominal_forces

@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from quadriga.agents.gait import horizon_stance, walking_steps
 from quadriga.agents.planner.peer_terms import Coupling
 from quadriga.agents.planner.peers import LOST, SILENT, PeerSelection
 from quadriga.agents.planner.planner import Planner
 from quadriga.agents.predictor.predictor import Predictor
-from quadriga.agents.time_grid import horizon_stance, walking_steps
 from quadriga.shared.config.sections import Config
 from tests.a1 import nominal_forces
 from tests.agents.calm import BASE, STEP, inputs_of, peer, plan, terms_of

@@ -10,9 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from quadriga.agents.gait import scheduled_stance
+from quadriga.agents.gait import horizon_stance, scheduled_stance
 from quadriga.agents.planner.peers import LOST, SILENT, USABLE, Neighbours, PeerData, PeerMemory
-from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config
 from quadriga.shared.messages import Measurement, Plan
 from quadriga.shared.robots.conventions import Array

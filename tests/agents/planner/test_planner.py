@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from quadriga.agents.gait import horizon_stance
 from quadriga.agents.planner.planner import Planner, PlannerState
 from quadriga.agents.planner.qp import unpack
 from quadriga.agents.predictor.predictor import Predictor
-from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robots.conventions import Array

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy import optimize
 
+from quadriga.agents.gait import horizon_stance
 from quadriga.agents.planner.qp import PlannerProblem, residuals, unpack
 from quadriga.agents.planner.solver import SOLVED, SOLVERS, DaqpSolver, judge
-from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config, PlannerConfig
 from quadriga.shared.robots.conventions import Array
 from tests.a1 import build_problem, nominal_forces

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from scipy import optimize
 
+from quadriga.agents.gait import horizon_stance
 from quadriga.agents.planner.peer_terms import PeerTerms
 from quadriga.agents.planner.planner import Planner, PlannerInputs
 from quadriga.agents.planner.team import build_centralised
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
-from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robots.conventions import Array

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from quadriga.agents.gait import nominal_forces
+from quadriga.agents.gait import horizon_stance, nominal_forces
 from quadriga.agents.planning.active_plan import (
     FARTHEST,
     ActivePlan,
@@ -15,7 +15,6 @@ from quadriga.agents.planning.active_plan import (
     add_plan,
     setpoint_at,
 )
-from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError

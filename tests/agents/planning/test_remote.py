@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from quadriga.agents.gait import horizon_stance
 from quadriga.agents.planning.active_plan import setpoint_at
 from quadriga.agents.planning.interface import Expected, PlanningInputs, PlanningOutputs
 from quadriga.agents.planning.registry import CheckedPlanning, PlanningState
 from quadriga.agents.planning.remote import RemotePlanning
-from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config, PlannerConfig, TeamConfig
 from quadriga.shared.config.timing import max_ages
 from quadriga.shared.messages import Measurement, Plan

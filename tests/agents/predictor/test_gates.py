@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy import integrate, linalg, optimize
 
+from quadriga.agents.gait import horizon_stance
 from quadriga.agents.planner import qp
 from quadriga.agents.planner.qp import Condensed
 from quadriga.agents.predictor.episode import Y_SCALE, Episode
@@ -35,7 +36,6 @@ from quadriga.agents.predictor.gates import (
     run_gates,
 )
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta, fit_plant
-from quadriga.agents.time_grid import horizon_stance
 from quadriga.shared.config.sections import Config, PlannerConfig
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robots.conventions import OUTPUTS, Array

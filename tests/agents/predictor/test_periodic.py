@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from quadriga.agents.gait import nominal_forces, scheduled_stance
+from quadriga.agents.gait import gait_phase, nominal_forces, scheduled_stance
 from quadriga.agents.predictor.episode import N_WRENCH, Y_SCALE, Episode, wrench_map
 from quadriga.agents.predictor.gates import coupling_table, held_out_error
 from quadriga.agents.predictor.periodic import (
@@ -24,7 +24,6 @@ from quadriga.agents.predictor.periodic import (
 )
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta, fit, fit_plant
 from quadriga.agents.predictor.store import load, predictor_sha256, save
-from quadriga.agents.time_grid import gait_phase
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robots.conventions import Array

@@ -2,12 +2,11 @@
 
 import numpy as np
 
-from quadriga.agents.gait import nominal_forces
+from quadriga.agents.gait import first_step, horizon_stance, nominal_forces, step_ms
 from quadriga.agents.planning.active_plan import ActivePlan
 from quadriga.agents.planning.interface import PlanningInputs, PlanningInterface, PlanningOutputs
 from quadriga.agents.planning.references import reference_at
 from quadriga.agents.predictor.episode import commanded_outputs
-from quadriga.agents.time_grid import first_step, horizon_stance, step_ms
 from quadriga.shared.messages import Plan
 from quadriga.shared.modes import WALK
 from quadriga.shared.robots.conventions import Array

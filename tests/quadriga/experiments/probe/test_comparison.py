@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from quadriga.agents.gait import phase_of, step_ms
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
-from quadriga.agents.time_grid import phase_of, step_ms
 from quadriga.experiments.probe.comparison import (
     OF_PREDICTOR,
     compare,

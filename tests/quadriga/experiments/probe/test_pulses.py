@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from quadriga.agents.gait import scheduled_stance
-from quadriga.agents.time_grid import phase_of, step_ms
+from quadriga.agents.gait import phase_of, scheduled_stance, step_ms
 from quadriga.experiments.probe.pulses import (
     DIRECTIONS,
     FORCE,
