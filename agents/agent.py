@@ -19,7 +19,7 @@ from quadriga.agents.counters import count
 from quadriga.agents.estimator.estimator import estimate, truth_row
 from quadriga.agents.estimator.robot_state import RobotState, gains_row
 from quadriga.agents.gait import Gait, Schedule
-from quadriga.agents.modes import ModeRules, Resume, Statuses, newest_statuses, ramp
+from quadriga.agents.modes import ModeRules, ResumeState, Statuses, newest_statuses, ramp
 from quadriga.agents.planner.solver import SolvedQp
 from quadriga.agents.planner.team import Collected
 from quadriga.agents.planning.active_plan import Setpoint, setpoint_at
@@ -70,7 +70,7 @@ class AgentState:
     last_tau: Array = field(default_factory=lambda: np.zeros(12))
     failures: int = 0
     counters: Mapping[str, int] = field(default_factory=dict)
-    resume: Resume = field(default_factory=Resume)
+    resume: ResumeState = field(default_factory=ResumeState)
     statuses: Statuses = field(default_factory=dict)
     stand_up: StandUp | None = None
     readings: Array | None = None

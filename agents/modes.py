@@ -55,7 +55,7 @@ _LOOKED_BACK_MS: Final = 4000  # at most, from a tick to the oldest reference th
 
 
 @record
-class Resume:
+class ResumeState:
     """What an agent remembers of its way back to walking, in ticks; −1: never.
 
     Attributes:
@@ -89,7 +89,9 @@ class ModeRules:
         self._resumes_alone = config.team.auto_resume
         self._resume_ms = round(1000 * config.team.resume_after)
 
-    def course(self, mode: Mode, resume: Resume, last: int, tick: int) -> tuple[Mode, Resume]:
+    def course(
+        self, mode: Mode, resume: ResumeState, last: int, tick: int
+    ) -> tuple[Mode, ResumeState]:
         """The mode if nothing stops the robot between the ticks `last` and `tick`."""
         if mode.name == WALK:
             return mode, resume
@@ -101,7 +103,7 @@ class ModeRules:
     def _half_cycle(self, tick: int) -> int:
         return (tick - self._stand_ms) // self._stance_ms
 
-    def _can_resume(self, mode: Mode, resume: Resume, tick: int) -> bool:
+    def _can_resume(self, mode: Mode, resume: ResumeState, tick: int) -> bool:
         if mode.name != STAND or not mode.may_resume or resume.inputs_ok_since < 0:
             return False
         requested = resume.requested >= 0 and tick - resume.requested <= REQUEST_MS
@@ -153,7 +155,9 @@ class ModeRules:
             return False
         return len(recent) == len(self._peers) or tick - since > GRACE_MS
 
-    def remember(self, resume: Resume, mode: Mode, inputs: Inputs, *, inputs_ok: bool) -> Resume:
+    def remember(
+        self, resume: ResumeState, mode: Mode, inputs: Inputs, *, inputs_ok: bool
+    ) -> ResumeState:
         """What is remembered after a tick.
 
         Requests are sent several times, and may come late: one to go on that was made before a
@@ -171,7 +175,7 @@ class ModeRules:
         if inputs.stop is not None:
             stopped = max(stopped, min(inputs.stop.tick or tick, tick))
         if not mode.may_resume:
-            after = Resume(resumed=resume.resumed, stopped=stopped)
+            after = ResumeState(resumed=resume.resumed, stopped=stopped)
             return resume if after == resume else after
         since = -1
         if inputs_ok:
@@ -180,7 +184,7 @@ class ModeRules:
         requested = -1 if inputs.stop is not None else resume.requested
         if inputs.resume is not None and inputs.resume.tick > stopped:
             requested = tick
-        return Resume(since, requested, resume.resumed, stopped)
+        return ResumeState(since, requested, resume.resumed, stopped)
 
 
 def newest_statuses(known: Statuses, arrived: Iterable[tuple[str, Status]]) -> Statuses:
@@ -189,7 +193,9 @@ def newest_statuses(known: Statuses, arrived: Iterable[tuple[str, Status]]) -> S
     return {**known, **newest} if newest else known
 
 
-def ramp(references: tuple[Reference, ...], resume: Resume, tick: int) -> tuple[Reference, ...]:
+def ramp(
+    references: tuple[Reference, ...], resume: ResumeState, tick: int
+) -> tuple[Reference, ...]:
     """The operator's references as a robot follows them that has begun to walk again.
 
     Nothing is asked of it for the time before, and then a rising share of the speed.

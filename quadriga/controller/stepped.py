@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from quadriga.agents.modes import Resume, ramp
+from quadriga.agents.modes import ResumeState, ramp
 from quadriga.agents.planning.interface import NOTHING, Expected
 from quadriga.agents.planning.references import reference_at, remember_references
 from quadriga.agents.step_io import Inputs, Outputs
@@ -50,7 +50,7 @@ class ControllerMemory:
     tick: int
     mode: Mode
     references: tuple[Reference, ...] = ()
-    resume: Resume = field(default_factory=Resume)
+    resume: ResumeState = field(default_factory=ResumeState)
 
 
 class SteppedController:
@@ -86,7 +86,7 @@ class SteppedController:
         _, age = reference_at(references, tick, self._height)
         mode = self._course(state.mode, inputs, led=age <= REFERENCE.max_age_ms)
         resumes = state.mode.may_resume and mode.name == WALK
-        resume = Resume(resumed=tick) if resumes else state.resume
+        resume = ResumeState(resumed=tick) if resumes else state.resume
         if mode.passive:
             command = damp_joints(tick)
         else:

@@ -16,7 +16,7 @@ from quadriga.agents.modes import (
     REQUEST_MS,
     SILENCE_MS,
     ModeRules,
-    Resume,
+    ResumeState,
     change_event,
     ramp,
 )
@@ -40,7 +40,7 @@ BEGIN = 8100  # tick, 300 + k · 200: a half cycle begins
 
 def begins(config: Config, mode: Mode, since: int, requested: int = -1, tick: int = BEGIN) -> bool:
     """Whether a robot in a mode, whose inputs are there since a tick, walks at a later one."""
-    resume = Resume(inputs_ok_since=since, requested=requested)
+    resume = ResumeState(inputs_ok_since=since, requested=requested)
     return ModeRules(config, "r1").course(mode, resume, tick - 1, tick)[0] == Mode(WALK, tick)
 
 
@@ -77,8 +77,8 @@ def test_from_nothing_else_it_resumes(mode: Mode) -> None:
 
 def test_references_rise_from_nothing_within_a_second() -> None:
     references = tuple(replace(asked(0.4), tick=tick) for tick in range(4000, 6000, 100))
-    assert ramp(references, Resume(), 5000) is references
-    followed = ramp(references, Resume(resumed=4500), 5000)
+    assert ramp(references, ResumeState(), 5000) is references
+    followed = ramp(references, ResumeState(resumed=4500), 5000)
     speeds = {item.tick: item.vx for item in followed}
     assert (speeds[4000], speeds[4500]) == (0.0, 0.0)
     assert speeds[4500 + RAMP_MS // 2] == pytest.approx(0.2)
@@ -288,6 +288,6 @@ def test_a_pair_that_had_lost_each_other_walks_and_plans_on_together() -> None:
     assert {name: o.mode for name, o in begun.items()} == {"r1": WALK, "r2": WALK}
     later = run(5000)
     assert {o.mode for o in later.values()} == {WALK}
-    used = {name: state.planning.planner.newest[0] for name, state in rollout.states.items()}
+    used = {name: state.planning.planner.planner.step for name, state in rollout.states.items()}
     assert set(used.values()) == {4960 // 40}
     assert not rollout.world.fallen()

@@ -22,12 +22,12 @@ FIRST_CALLS = """
 from quadriga.agents.agent import Agent
 from quadriga.agents.rehearsal import rehearse
 from quadriga.shared.config.sections import Config, TeamConfig
+from quadriga.agents.controller import controller
 from quadriga.sim_server.world import motors
-from quadriga.plant.commands import CommandBox
 from quadriga.sim_server.world.world import World
 config = Config(team=TeamConfig(robots=1))
 WHAT
-first = motors._drive.signatures
+first = controller._control.signatures + motors._drive.signatures
 print(len(first))
 """
 
@@ -42,13 +42,7 @@ def test_limits_of_both_qps_are_met(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize(
-    "what",
-    [
-        'rehearse(config, Agent(config, "r1", None))',
-        'CommandBox("team", ["r1"], config.robot)',
-        "World(config)",
-    ],
-    ids=["agent", "commands", "world"],
+    "what", ['rehearse(config, Agent(config, "r1", None))', "World(config)"], ids=["agent", "world"]
 )
 def test_nothing_of_the_first_tick_is_left_to_compile(what: str) -> None:
     """On a machine that has compiled nothing yet it takes seconds, of a walk in real time."""

@@ -79,15 +79,14 @@ def test_a_step_that_took_in_the_next_state_alone_needs_no_record() -> None:
     assert again.number == 1
 
 
-def test_statuses_of_others_are_listed_in_both_modes() -> None:
+def test_statuses_of_others_are_listed_in_real_time() -> None:
     said = Status(500, 0, "walk", "", "", {}, {}, np.zeros(0), np.zeros(0))
-    for mode in ("realtime", "lockstep"):
-        _, box = intake(mode)
-        told = Inputs(standing(504), statuses=(("r1", said),))
-        found = box.record(503, told, NOTHING)
-        assert found is not None
-        assert found.taken == ("status:r1:500",)
-        assert [parse_message_id(text) for text in found.taken] == list_messages(told)
+    _, box = intake("realtime")
+    told = Inputs(standing(504), statuses=(("r1", said),))
+    found = box.record(503, told, NOTHING)
+    assert found is not None
+    assert found.taken == ("status:r1:500",)
+    assert [parse_message_id(text) for text in found.taken] == list_messages(told)
 
 
 def test_lock_step_tells_only_the_unusual() -> None:

@@ -15,6 +15,7 @@ from quadriga.commands.config_options import KEYS, UNCONFIGURED, read_config
 from quadriga.commands.parser import build_parser, main
 from quadriga.shared.config.load import load
 
+EACH = ("--yokes", "none", "--mode", "realtime", "--set", "team.plant_per_robot=true")
 BRIDGED = ("--set", "team.plant=robots", "--set", "team.plant_per_robot=true")
 
 
@@ -47,7 +48,7 @@ def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, 
             "--robot: got 'r1', expected nothing (team.plant_per_robot is false)",
         ),
         (
-            ["sim", "--yokes", "none", "--set", "team.plant_per_robot=true"],
+            ["sim", *EACH],
             "--robot: got '', expected one of r1, r2, r3 (team.plant_per_robot is true)",
         ),
         (

@@ -109,8 +109,8 @@ def test_a_preset_replaces_what_was_said_before_it_and_not_what_is_said_with_it(
         (
             "none",
             [],
-            {"team__plant_per_robot": True, "world__mode": "realtime", "team__yokes": "none"},
-            "team.plant, team.plant_per_robot: got 'mujoco', true, expected 'mujoco', false",
+            {"team__plant": "puppet"},
+            "team.plant, team.plant_per_robot: got 'puppet', false, expected 'mujoco', false",
         ),
         ("none", ["world.payload_on=team,r7"], {"world__payload": 2.0}, "r7"),
         ("later:world.seed=3", [], {}, "variant later: world.seed"),

@@ -75,7 +75,7 @@ def test_new_names_and_comments_change_no_digest_and_a_gain_does(copy: Path) -> 
     edit(copy, r"\bnominal_forces\b", "resting_forces")
     edit(copy, r"\Z", "\n# Why all of this is so.\n")
     assert short_digests(copy) == before
-    edit(copy, r"kp_z: float = key\(400\.0", "kp_z: float = key(401.0")
+    edit(copy, r"kp_z: float = number\(400\.0", "kp_z: float = number(401.0")
     edit(copy, r"(?m)^U_SCALE: Final = 10\.0", "U_SCALE: Final = 10.5")
     after = short_digests(copy)
     assert [new != old for new, old in zip(after, before, strict=True)] == [True, True]

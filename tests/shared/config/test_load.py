@@ -107,6 +107,9 @@ def test_every_key_keeps_its_range_and_says_what_it_is(section: str) -> None:
             assert refused({name: "something else"}) == name
 
 
+EACH = '[world]\nmode = "realtime"\n'
+
+
 @pytest.mark.parametrize(
     ("text", "name"),
     [
@@ -134,9 +137,10 @@ def test_every_key_keeps_its_range_and_says_what_it_is(section: str) -> None:
         ("[motors]\nrotor_inertia = false\n", "motors.rotor_inertia"),
         ('[team]\nplant = "robots"\n', "team.plant_per_robot"),
         ('[team]\nplant = "robots"\nplant_per_robot = true\n', "world.mode"),
-        ("[team]\nplant_per_robot = true\n", "team.plant_per_robot"),
+        ("[team]\nplant_per_robot = true\n", "world.mode"),
+        (f"{EACH}[team]\nplant_per_robot = true\n", "team.plant_per_robot"),
         (
-            '[team]\nplant_per_robot = true\nyokes = "none"\n[estimator]\nkind = "truth"\n',
+            f'{EACH}[team]\nplant_per_robot = true\nyokes = "none"\n[estimator]\nkind = "truth"\n',
             "estimator.kind",
         ),
     ],
