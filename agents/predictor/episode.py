@@ -20,6 +20,7 @@ from quadriga.shared.messages import Reference
 from quadriga.shared.robots.conventions import N_FORCES, N_LEGS, N_OUTPUTS, Array
 from quadriga.shared.robots.registry import ROBOTS
 
+_MOST: Final = 1e100  # of a signal: its squares and their sums are finite too
 SIGNALS: Final = ("u", "u_nominal", "y", "y_base")  # an episode's arrays
 
 
@@ -161,12 +162,21 @@ def as_signal(name: str, values: ArrayLike) -> Array:
     """A signal with an axis of agents, (T, n, dim), which may be given without, (T, dim).
 
     Raises:
-        PredictorError: no array of numbers, or of other axes.
+        PredictorError: no array of real, finite numbers up to 1e100 without a mask; other axes.
     """
+    if np.ma.is_masked(values):
+        raise PredictorError(
+            name, "masked samples", "numbers", "split the data into episodes there"
+        )
+    if np.iscomplexobj(values):
+        raise PredictorError(name, "complex numbers", "real numbers")
     try:
         array = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise PredictorError(name, "something else", "an array of numbers") from None
+    if not (np.abs(array) <= _MOST).all():  # nor is NaN
+        got = "NaN, infinity or too large numbers"
+        raise PredictorError(name, got, f"finite numbers up to {_MOST:g}", "samples were lost?")
     if array.ndim == 2:
         array = array[:, None]
     if array.ndim != 3:

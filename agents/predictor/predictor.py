@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -357,14 +358,20 @@ def fit_plant(
 
     Raises:
         PredictorError: an unknown kind, too little data, or inputs that do not excite the plant.
+
+    Warns:
+        UserWarning: a signal has a mean beyond its standard deviation; no fit has an intercept.
     """
     if kind not in KINDS:
         raise PredictorError("kind", repr(kind), ", ".join(KINDS), did_you_mean(kind, KINDS))
+    for name, samples in (("T_ini", T_ini), ("N", N), ("period", period)):
+        if isinstance(samples, bool) or not isinstance(samples, int | np.integer) or samples < 1:
+            raise PredictorError(name, repr(samples), "a whole number of samples, at least 1")
     if (period > 1) != (kind == "periodic"):
         raise PredictorError("period", f"{period} of {kind!r}", "above 1 of 'periodic', else 1")
-    if not (T_ini >= 1 and N >= 1 and ridge >= 0.0 and block_weight > 0.0):
-        got = f"{T_ini}, {N}, {ridge:g}, {block_weight:g}"
-        raise PredictorError("T_ini, N, ridge, block_weight", got, "numbers above 0")
+    if not (ridge >= 0.0 and block_weight > 0.0):
+        got = f"{ridge:g}, {block_weight:g}"
+        raise PredictorError("ridge, block_weight", got, "not negative, and positive")
     if not episodes:
         raise PredictorError("episodes", "none", "at least one")
     n, m, p = *episodes[0].u.shape[1:], episodes[0].y.shape[2]
@@ -372,14 +379,28 @@ def fit_plant(
     if B.shape[1] != m:
         raise PredictorError("input_map", f"shape {B.shape}", f"(w, {m})")
     check_episodes(episodes, Layout(n, m, p, T_ini, N, (1.0,) * m, (1.0,) * p, everyone(n)))
-    inputs = [episode.deviations()[0] for episode in episodes]
-    scales = _sizes(inputs), _sizes([episode.deviations()[1] for episode in episodes])
+    inputs, outputs = zip(*(episode.deviations() for episode in episodes), strict=True)
+    _check_variation(inputs, outputs)
+    scales = _sizes(inputs), _sizes(outputs)
     layout = Layout(n, m, p, T_ini, N, *scales, everyone(n))
     meta = PredictorMeta(n, N, T_ini, kind, period, ridge, block_weight, plant=layout)
     if kind == "pinv" or ridge == 0.0:
         scaled = [episode.scaled_deviations(layout)[0] for episode in episodes]
         check_excitation(scaled, T_ini + N)
     return fit(episodes, meta, B / np.array(_sizes([u @ B.T for u in inputs]))[:, None])
+
+
+def _check_variation(inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
+    """Refuse an input that never changes, and warn of a working point that is not zero."""
+    for name, signals in (("u", inputs), ("y", outputs)):
+        each = np.concatenate([signal.reshape(len(signal), -1) for signal in signals])
+        spread = each.std(axis=0)
+        still = spread <= 1e-12 * np.abs(each).max(axis=0)
+        if name == "u" and still.any():
+            raise PredictorError("u", f"columns {np.flatnonzero(still)} constant", "varying inputs")
+        if (np.abs(each.mean(axis=0)) > spread)[~still].any():
+            text = "has a mean beyond its standard deviation, and a fit has no intercept"
+            warnings.warn(f"{name} {text}: hand in deviations from a working point", stacklevel=3)
 
 
 def _sizes(signals: Sequence[Array]) -> tuple[float, ...]:

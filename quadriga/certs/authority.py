@@ -20,7 +20,7 @@ from cryptography.hazmat.primitives.serialization import (
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.security.certificates import UNREADABLE, load_certificate
+from quadriga.shared.security.certificates import UNREADABLE, describe_pem_error, load_certificate
 
 _YEARS: Final = timedelta(days=3650)  # of the authority itself
 # RFC 1123, and `_` as container networks have it; digits alone are an address with a mistake.
@@ -62,10 +62,10 @@ class Authority:
         """
         self.pair = pair
         try:
-            self._certificate = load_certificate(pair.certificate)
-            key = load_pem_private_key(pair.key, password=None)
+            self._certificate = load_certificate(text := pair.certificate)
+            key = load_pem_private_key(text := pair.key, password=None)
         except UNREADABLE as error:
-            raise _unreadable("authority of the team", error) from None
+            raise _unreadable("authority of the team", describe_pem_error(text, error)) from None
         if not isinstance(key, ec.EllipticCurvePrivateKey):
             raise _unreadable("key of the team's authority", type(key).__name__)
         self._key = key

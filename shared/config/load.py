@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import Field, fields
@@ -20,6 +21,11 @@ from quadriga.shared.planner_kinds import NO_PLANNER
 from quadriga.shared.robots.registry import ROBOTS
 
 _SHOWN: Final = 200  # characters of a value that is wrong
+_LARGEST: Final = 1 << 22  # bytes of a file
+# A key of so many parts that the parser, which copies them for each one, takes the memory.
+_MANY_PARTS: Final = re.compile(
+    r"""(?<![\w-])(?:(?:[\w-]++|"(?:\\.|[^"\\\n])*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){100}"""
+)
 
 
 def load(path: Path | None = None, overrides: Mapping[str, Any] | None = None) -> Config:
@@ -148,10 +154,13 @@ def read_toml(path: Path) -> dict[str, Any]:
     """What a TOML file says.
 
     Raises:
-        ConfigError: it cannot be read, or is no TOML.
+        ConfigError: it cannot be read, is no TOML, or would take the memory.
     """
-    with name_file_errors(ConfigError, path, "a readable TOML file"):
-        text = path.read_text(encoding="utf-8-sig")  # some editors begin with a mark
+    with name_file_errors(ConfigError, path, "a readable TOML file"), path.open("rb") as file:
+        content = file.read(_LARGEST + 1)
+        if len(content) > _LARGEST:
+            raise ConfigError(str(path), f"more than {_LARGEST:,} bytes", "a TOML file")
+        text = content.decode("utf-8-sig")  # some editors begin with a mark
     try:
         return _parse_toml(str(path), text)
     except tomllib.TOMLDecodeError as error:
@@ -162,9 +171,12 @@ def _parse_toml(name: str, text: str) -> dict[str, Any]:
     """What a text says.
 
     Raises:
-        ConfigError: it is TOML, but nests too deeply or has a number of too many digits.
-        tomllib.TOMLDecodeError: it is none.
+        ConfigError: it has a key of too many parts, nests too deeply or has a number of too many
+            digits.
+        tomllib.TOMLDecodeError: it is no TOML.
     """
+    if _MANY_PARTS.search(text):
+        raise ConfigError(name, "a key of more than 100 parts", "section.key")
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError:

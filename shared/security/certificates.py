@@ -86,7 +86,7 @@ def read_certificate(path: Path) -> Certificate:
     except x509.ExtensionNotFound:
         hosts = ()
     except UNREADABLE as error:
-        raise _damaged(path, error) from None
+        raise _damaged(path, str(error)) from None
     name = str(names[0].value) if names else ""
     return Certificate(name, hosts, found.not_valid_before_utc, found.not_valid_after_utc)
 
@@ -114,18 +114,24 @@ def load_certificate(text: bytes) -> x509.Certificate:
         return x509.load_pem_x509_certificate(text)
 
 
+def describe_pem_error(text: bytes, error: Exception) -> str:
+    """What is wrong with a PEM file; the library's words are about itself where there is no PEM."""
+    if b"-----BEGIN " in text:
+        return str(error)
+    return "text that is not PEM" if text.strip() else "an empty file"
+
+
 def _load(path: Path) -> x509.Certificate:
     with name_file_errors(ConfigError, path, "a certificate", "`quadriga certs make` makes it"):
         text = path.read_bytes()
     try:
         return load_certificate(text)
     except UNREADABLE as error:
-        raise _damaged(path, error) from None
+        raise _damaged(path, describe_pem_error(text, error)) from None
 
 
-def _damaged(path: Path, error: Exception) -> ConfigError:
-    cause = "damaged? `quadriga certs renew`"
-    return ConfigError(str(path), str(error)[:200], "a certificate", cause)
+def _damaged(path: Path, got: str) -> ConfigError:
+    return ConfigError(str(path), got[:200], "a certificate", "damaged? `quadriga certs renew`")
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,7 +170,8 @@ def tls_files(certificates: str, process: str) -> TlsFiles:
     copy = f"`quadriga certs make` makes it; copy the folder {identity} to this machine"
     for path in (files.authority, files.certificate, files.key):
         if not path.is_file() or not path.stat().st_size:
-            raise ConfigError(str(path), "no file, or an empty one", f"that of {identity}", copy)
+            got = "an empty file" if path.is_file() else "no such file"
+            raise ConfigError(str(path), got, f"that of {identity}", copy)
     if files.key.stat().st_mode & OTHERS:
         mode = f"mode {files.key.stat().st_mode & 0o777:o}"
         raise ConfigError(str(files.key), mode, "600", "others may read this private key")

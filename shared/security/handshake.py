@@ -12,7 +12,8 @@ from typing import Final
 
 from quadriga.shared.config.endpoints import host_and_port
 from quadriga.shared.errors import ConfigError, system_reason
-from quadriga.shared.security.certificates import EXPIRED, NOT_YET_VALID, TlsFiles
+from quadriga.shared.runtime.clock import utc_now
+from quadriga.shared.security.certificates import EXPIRED, NOT_YET_VALID, TlsFiles, read_certificate
 
 TRUSTED: Final = "trusted"
 UNREACHABLE: Final = "unreachable"  # nobody answers there
@@ -29,7 +30,7 @@ CAUSES: Final = {
     NOT_YET_VALID: "a clock that is wrong, here or where it was made",
     UNTRUSTED: "another authority's, or the router was not made for this address: "
     "`quadriga certs make --router HOST`",
-    REFUSED: "ours has expired, is not yet valid or another authority's: `quadriga certs show`",
+    REFUSED: "ours has expired or is another authority's: `quadriga certs show`",
 }
 
 
@@ -52,7 +53,9 @@ def shake_hands(endpoint: str, files: TlsFiles) -> Handshake:
         ConfigError: the endpoint is malformed, or the files cannot be used.
     """
     host, port = host_and_port(endpoint)
-    context = _context(files)
+    context, now, held = _context(files), utc_now(), read_certificate(files.certificate)
+    if held.state(now) == NOT_YET_VALID:  # the other side would say that it has expired
+        return Handshake(NOT_YET_VALID, f"ours is from {held.begins:%F %T} on, now is {now:%F %T}")
     try:
         with (
             socket.create_connection((host, port), _TIMEOUT) as link,

@@ -125,8 +125,11 @@ U, Y = np.random.default_rng(0).normal(size=(100, 2)), np.zeros((100, 1))
     ("changes", "text"),
     [
         ({"kind": "pinw"}, "did you mean 'pinv'"),
-        ({"T_ini": 0}, "T_ini, N, ridge, block_weight: got 0, 4"),
-        ({"kind": "ridge", "ridge": -1.0}, "T_ini, N, ridge"),
+        ({"T_ini": 0}, "T_ini: got 0, expected a whole number"),
+        ({"T_ini": 4.0}, r"T_ini: got 4\.0, expected a whole number"),
+        ({"N": "10"}, "N: got '10', expected a whole number"),
+        ({"kind": "ridge", "ridge": -1.0}, "ridge, block_weight: got -1"),
+        ({"episodes": [Episode.of(U * [1.0, 0.0] + [0.0, 7.3], Y)]}, r"u: got columns \[1\] const"),
         ({"N": 98}, "got 100 samples, expected at least 101"),
         ({"N": 40}, "rank 58, expected rank 86: persistently exciting of order 43"),
         ({"kind": "ridge", "ridge": 0.0, "N": 40}, "persistently exciting"),
@@ -148,10 +151,19 @@ def test_what_cannot_be_fitted_is_refused_by_name(changes: dict[str, Any], text:
     [
         (U, Y[:20], r"episode\.y: got shape \(20, 1, 1\)"),
         (U[:, 0], Y, r"u: got shape \(100,\)"),
-        (U * np.inf, Y, r"episode\.u: got NaN or infinity"),
+        (U * np.inf, Y, r"u: got NaN, infinity or too large numbers"),
+        (U * 1e200, Y, r"u: got NaN, infinity or too large numbers"),
+        (U + 1j, Y, "u: got complex numbers"),
+        (np.ma.masked_less(U, 0.0), Y, "u: got masked samples"),
         ([["a"]], Y, "an array of numbers"),
+        ([[10**400]], Y, "an array of numbers"),
     ],
 )
 def test_signals_that_do_not_belong_together_are_refused(u: Any, y: Any, text: str) -> None:
     with pytest.raises(PredictorError, match=text):
         Episode.of(u, y)
+
+
+def test_a_mean_is_warned_of() -> None:
+    with pytest.warns(UserWarning, match="y has a mean beyond its standard deviation"):
+        fit_plant([Episode.of(U, U[:, :1] + 5.0)], "ridge", 3, 4)

@@ -140,11 +140,12 @@ def test_peers_weigh_less_if_asked() -> None:
 def test_inputs_that_do_not_excite_are_refused_without_a_penalty() -> None:
     data = data_of(1)
     dead = [replace(data[0], u=data[0].u * [1.0, 0.0])]
+    twins = [replace(data[0], u=data[0].u[:, :, [0, 0]])]
     regression = normal_equations(dead, layout_of(1))
     with pytest.raises(PredictorError, match=r"a larger ridge \(identification\.ridge\)"):
         solve_ridge(regression, layout_of(1), 0.0, 1.0)
     with pytest.raises(PredictorError, match="rank 7, expected rank 14: persistently exciting"):
-        fit_plant(dead, "pinv", T_INI, N)
+        fit_plant(twins, "pinv", T_INI, N)
     with pytest.raises(PredictorError, match="not persistently exciting of order 7"):
         reduce(dead, layout_of(1))
 

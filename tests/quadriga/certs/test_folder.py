@@ -53,23 +53,23 @@ def test_a_key_that_others_can_read_is_refused(folder: CertificateFolder) -> Non
 
 
 def test_a_certificate_that_is_not_there_is_one_clear_error(folder: CertificateFolder) -> None:
-    with pytest.raises(ConfigError, match=r"no file.*that of r9.*certs make"):
+    with pytest.raises(ConfigError, match=r"no such file.*that of r9.*certs make"):
         tls_files(str(folder.path), "r9")
 
 
 @pytest.mark.parametrize("name", ["certificate.pem", "authority.pem", "key.pem"])
 def test_an_empty_file_is_named(folder: CertificateFolder, name: str) -> None:
     (folder.path / "r1" / name).write_bytes(b"")
-    with pytest.raises(ConfigError, match=rf"r1/{name}: got no file, or an empty"):
+    with pytest.raises(ConfigError, match=rf"r1/{name}: got an empty file"):
         tls_files(str(folder.path), "r1")
 
 
 def test_what_is_not_pem_is_said_to_be_that(folder: CertificateFolder) -> None:
     (folder.path / "authority.key").write_bytes(b"")
-    with pytest.raises(ConfigError, match="authority of the team: got "):
+    with pytest.raises(ConfigError, match="authority of the team: got an empty file"):
         folder.renew((), (), NOW, 1.0)
     (folder.path / "r1" / "certificate.pem").write_text("key\n", encoding="utf-8")
-    with pytest.raises(ConfigError, match=r"r1/certificate\.pem: got "):
+    with pytest.raises(ConfigError, match=r"r1/certificate\.pem: got text that is not PEM"):
         folder.standings()
 
 
