@@ -60,7 +60,9 @@ def _check_others(server: PlantServer, pace: TeamPace | None) -> None:
     server.time.look(present)
     timeout = server.config.bus.clock_timeout
     if behind := server.time.behind(server.plant.tick - round(1000 * timeout)):
-        server.time.end = plant_gone(sorted(behind), f"silent for {timeout:g} s")
+        server.time.end = plant_gone(
+            sorted(behind), f"silent for {timeout:g} s{server.bus.standstill.note}"
+        )
 
 
 class _Motors:

@@ -133,7 +133,7 @@ class PlantServer:
             return
         for refused in filter(None, map(self.commands.why_refused, sorted(robots))):
             why += f", its last command was refused ({refused})"
-        detail = f"{', '.join(sorted(robots))} {why}"
+        detail = f"{', '.join(sorted(robots))} {why}{self.bus.standstill.note}"
         self.end(End(codes.COMMAND_LOST, detail))
 
     def end(self, end: End) -> None:

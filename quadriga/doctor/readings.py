@@ -14,7 +14,7 @@ from typing import Final, TypeVar
 
 from quadriga.doctor.machine import MachineReadings
 from quadriga.doctor.packages import split_requirement
-from quadriga.shared.runtime.installed import PROJECT
+from quadriga.shared.runtime.installed import PROJECT, shadowing_files
 from quadriga.shared.runtime.places import cache_dir
 from quadriga.shared.runtime.system_clock import system_clock_error_ns
 from quadriga.team.run_folder import RUNS
@@ -49,6 +49,7 @@ def read_machine() -> MachineReadings:
         receive_buffer=_read(lambda: int(_RECEIVE_BUFFER.read_text(encoding="ascii"))),
         requirements=requirements,
         installed={name: version for name, version in versions.items() if version},
+        shadowing=shadowing_files(),
     )
 
 

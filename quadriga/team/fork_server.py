@@ -227,8 +227,9 @@ def main() -> NoReturn:
         os.close(write)
         os.close(handles[0])
         with open(read, "rb") as said:  # until the last fork has closed it too
-            line.send(said.read() or b"[]")
-        os.waitpid(between, 0)
+            pids = said.read()
+        os.waitpid(between, 0)  # only now are they adopted, and can be waited for
+        line.send(pids or b"[]")
 
 
 def _prepare(commands: Collection[str], ready: set[str]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 from collections import deque
 from collections.abc import Callable, Collection, Sequence
@@ -29,7 +30,9 @@ _ONE_THREAD: Final = (
 QUADRIGA: Final = (*PYTHON, "-m", "quadriga")
 _SEVERAL: Final = 2  # processes, from which on it pays to import once for all
 _LAST_WORDS: Final = 12  # lines of a failed process's log that are shown
+_LEAST_DISK: Final = 4096  # bytes, of a file's first block
 _LOOK: Final = 0.02  # s
+_LARGEST_LOG: Final = 1 << 26  # bytes; of a longer one the first half is kept, and what comes then
 _LAST_CHANCE: Final = 2.0  # s for who has not left by itself in time, before SIGKILL
 _ROUTER_GRACE: Final = 5.0  # s
 _EARLY: Final = 4.0  # s, by which others may leave before who drives time: it closes politely
@@ -207,9 +210,15 @@ class Launch:
         """Names of those that have ended since this was asked last.
 
         Raises:
-            ProcessError: some failed. Of several the first that a signal ended is named, since
-                others may complain that it is gone, else the first of the table.
+            ProcessError: the folder of the logs is gone, or some failed. Of several the first
+                that a signal ended is named, since others may complain that it is gone, else the
+                first of the table.
         """
+        if not self._logs.is_dir():
+            got, expected = "a folder that was deleted", "one that stays while the team walks"
+            raise ProcessError(str(self._logs), got, expected)
+        for name in self._running:
+            bound_log(self._logs / f"{name}.log")
         polled = {name: process.poll() for name, process in self._running.items()}
         ended = {name: status for name, status in polled.items() if status is not None}
         for name in ended:
@@ -233,7 +242,8 @@ class Launch:
         ):
             lines = deque(log, maxlen=_LAST_WORDS)
         words = "".join(f"  {line}" for line in lines).rstrip()
-        return words or "  (none)"
+        full = self._logs.is_dir() and shutil.disk_usage(self._logs).free < _LEAST_DISK
+        return words or f"  (none{': the disk is full' if full else ''})"
 
     def stop(self) -> None:
         """Stop what still runs: SIGTERM, the recorder last, and SIGKILL after a grace period.
@@ -278,3 +288,11 @@ def _is_quadriga(row: ProcessSpec) -> bool:
 def _environment() -> dict[str, str]:
     # Their logs are read as UTF-8, whatever the terminal has.
     return {**os.environ, **dict.fromkeys(_ONE_THREAD, "1"), "PYTHONIOENCODING": "utf-8"}
+
+
+def bound_log(log: Path) -> None:
+    """Cut a log that a process floods, and say so in it; processes write at its end."""
+    if log.exists() and log.stat().st_size > _LARGEST_LOG:
+        os.truncate(log, _LARGEST_LOG // 2)
+        with log.open("ab") as file:
+            file.write(b"\n(more was written here than a log may hold, and cut)\n")

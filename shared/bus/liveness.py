@@ -44,10 +44,11 @@ def find_loss(bus: Bus, config: Config) -> Loss | None:
     return None
 
 
-def loss_error(loss: Loss, tick: int, missed_ns: int = 0) -> ProcessError:
+def loss_error(loss: Loss, tick: int, missed_ns: int = 0, note: str = "") -> ProcessError:
     """The error of a process that ends because of a loss at a tick, ms.
 
-    `missed_ns` is when it was missed first, ns since 1970; 0: that is not known.
+    `missed_ns` is when it was missed first, ns since 1970; 0: that is not known. `note` is what
+    the process has to say of itself, see `Standstill`.
     """
     cause = "killed, failed, or cut off: see what it says itself"
     if loss.code == LINK_LOST:
@@ -56,7 +57,9 @@ def loss_error(loss: Loss, tick: int, missed_ns: int = 0) -> ProcessError:
     if missed_ns:
         moment = datetime.fromtimestamp(1e-9 * missed_ns, UTC)
         got += f", missed since {moment.isoformat(timespec='milliseconds')[:-6]}Z"
-    return ProcessError(loss.what, got, "it to be there until the walk's announced end", cause)
+    return ProcessError(
+        loss.what, got, "it to be there until the walk's announced end", cause + note
+    )
 
 
 def missed_ns_of(line: str) -> int:
@@ -138,7 +141,8 @@ class Liveness:
         """
         loss = self._timer.poll()
         if loss is not None:
-            raise loss_error(loss, max(tick, 0), self._timer.missed_ns)
+            note = self._bus.standstill.note
+            raise loss_error(loss, max(tick, 0), self._timer.missed_ns, note)
 
     def receive(self) -> None:
         """Something has arrived: the team walks."""

@@ -26,6 +26,7 @@ from quadriga.shared.bus.settings import (
     opening_error,
     router_settings,
 )
+from quadriga.shared.bus.standstill import Standstill
 from quadriga.shared.config.sections import BusConfig
 from quadriga.shared.errors import BusError
 from quadriga.shared.members import ROUTER
@@ -95,7 +96,7 @@ class Bus:
         self._oversized: SimpleQueue[None] = SimpleQueue()  # counts what several threads drop
         self._tokens: set[tuple[str, str, str]] = set()  # of others: name, stage, session
         self._declared: dict[str, zenoh.LivelinessToken] = {}
-        self._closed = False
+        self._closed, self.standstill = False, Standstill()
         tokens, ack = f"{team}/*/*/*", f"{team}/{name}/{RECEIVED}"
         # Zenoh drops publishers and subscribers nobody refers to.
         self._declarations: list[Any] = [
@@ -279,16 +280,21 @@ class Bus:
 
     def get(self, timeout: float) -> Packet | None:
         """The oldest packet of the inbox, waiting at most `timeout` seconds for one."""
+        self.standstill.look()
         sample = self._inbox.take(timeout)
+        self.standstill.look()
         return None if sample is None else _packet(sample)
 
     def drain(self) -> list[Packet]:
         """Everything in the inbox, oldest first, without waiting."""
+        self.standstill.look()
         return [_packet(sample) for sample in self._inbox.drain()]
 
     def declare(self, stage: str) -> None:
         """Tell everyone that this process has reached `stage`; again has no effect."""
         if stage not in self._declared:
+            if stage == READY:
+                self.standstill.begin()
             key = f"{self.team}/{self.name}/{stage}/{self._me}"
             self._declared[stage] = self._session.liveliness().declare_token(key)
 

@@ -40,7 +40,7 @@ CORRUPT: Final = (
 
 _MESSAGE: Final = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log, publish
 _LATEST: Final = (1 << 63) - 1  # ns: what MCAP has 64 bits for, tables have 63 and a sign
-_BARE: Final = (Opcode.CHANNEL, Opcode.MESSAGE)  # in chunks, and outside of any
+BARE: Final = (Opcode.CHANNEL, Opcode.MESSAGE)  # in chunks, and outside of any
 _RECOVER: Final = "`quadriga recover` writes what is readable"
 _MEND: Final = f"one cut or damaged in its first bytes: {_RECOVER}"
 _PART: Final = 1 << 20  # bytes that are read at once
@@ -104,7 +104,7 @@ class Recording:
             try:
                 if opcode == Opcode.CHUNK:
                     yield from messages_of(content_of(content), wanted, names, keys)
-                elif opcode in _BARE:
+                elif opcode in BARE:
                     record = RECORD.pack(opcode, len(content)) + content
                     yield from messages_of(record, wanted, names, keys)
             except CORRUPT as error:

@@ -1,4 +1,4 @@
-"""What is left of a damaged recording: every intact chunk, and the metadata."""
+"""What is left of a damaged recording: intact chunks, records outside of any, the metadata."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from mcap.writer import MCAP0_MAGIC
 from quadriga.shared.errors import RecordingError, name_file_errors
 from quadriga.shared.recording.metadata import PROFILE, unseal
 from quadriga.shared.recording.reader import (
+    BARE,
     CORRUPT,
     RECORD,
     ChunkEntry,
@@ -31,9 +32,11 @@ from quadriga.shared.recording.reader import (
 _HEAD: Final = re.compile(rb"(?s)[\x01-\x0f\x80-\xff].{4}\0{4}")  # of a record below 4 GiB
 # A chunk's record: opcode, length, first and last log time, size, checksum, packing, packed size.
 _CHUNK: Final = struct.Struct("<BQQQQI")
-_KEPT: Final = re.compile(  # what a chunk or metadata begins with
-    rb"\x06.{4}\0{4}.{28}(?:\0{4}|\x03\0{3}lz4|\x04\0{3}zstd)|\x0c.{4}\0{4}", re.DOTALL
+_ANY_CHUNK: Final = (  # what one begins with; not packed, both sizes in it are the same
+    rb"(?s)\x06.{4}\0{4}.{16}(?!\0{8})(.{8}).{4}(?:\0{4}\1|\x03\0{3}lz4|\x04\0{3}zstd)"
 )
+_KEPT: Final = re.compile(_ANY_CHUNK + rb"|\x0c.{4}\0{4}")  # or metadata
+_BARE_KEPT: Final = re.compile(rb"(?s)[\x04\x05\x0c].{3}\0{5}")  # in a file without chunks
 _HEADER: Final = 64  # bytes within which a file's header names the program that wrote it
 _CUT: Final = "the file ends in the middle"
 
@@ -65,7 +68,7 @@ class DamagedRecording:
     """A damaged recording, read as far as it can be.
 
     Where no record begins, the next intact chunk, or metadata, is looked for. Messages outside
-    chunks have no checksum: they are not believed.
+    chunks have no checksum: in a file that has chunks, none is believed after such a place.
 
     Attributes:
         metadata: what the writer was given, {} if no copy of it is intact.
@@ -89,7 +92,8 @@ class DamagedRecording:
                 self._file = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
             except ValueError:
                 raise RecordingError(str(path), "an empty file", "a recording") from None
-        self._chunks = list(self._scan())
+        self._chunked = re.search(_ANY_CHUNK, self._file) is not None
+        self._pieces = list(self._scan())
         self._scanned = tuple(self.damages)
         named = any(name.startswith(PROFILE) for name in self.notes)
         if self.metadata or named or PROFILE.encode() in self._file[:_HEADER]:
@@ -106,16 +110,17 @@ class DamagedRecording:
         """Every message that can be read, in the order of the file."""
         self.damages = list(self._scanned)
         keys = self._indexed_keys()
-        for at, end in self._chunks:
+        for at, end in self._pieces:
             try:
-                content = content_of(self._file[at + RECORD.size : end])
-                yield from messages_of(content, keys)
+                bare = self._file[at] in BARE
+                content = self._file[at + (0 if bare else RECORD.size) : end]
+                yield from messages_of(content if bare else content_of(content), keys)
             except CORRUPT as error:  # of another program: its checksum is right
                 self.damages.append(Damage(at, end - at, f"a foreign chunk ({error})"))
         self.damages.sort(key=lambda damage: damage.at)
 
     def _scan(self) -> Iterator[tuple[int, int]]:
-        """Begin and end of every intact chunk. Notes damages, and metadata as they pass by."""
+        """Begin and end of all that holds messages. Notes damages, and metadata as they pass by."""
         file, size = self._file, len(self._file)
         at = min(len(MCAP0_MAGIC), size)
         if file[:at] != MCAP0_MAGIC:
@@ -123,7 +128,8 @@ class DamagedRecording:
         done = size - len(MCAP0_MAGIC) if file[-len(MCAP0_MAGIC) :] == MCAP0_MAGIC else size
         while at < done:
             end = self._end_of(at)
-            if end and file[at] == Opcode.CHUNK:
+            believed = file[at] in BARE and not (self._chunked and self.damages)
+            if end and (file[at] == Opcode.CHUNK or believed):
                 yield at, end
             at = end or self._pass_damage(at, done)
         if done == size and not (self.damages and self.damages[-1].what == _CUT):
@@ -139,7 +145,7 @@ class DamagedRecording:
         with suppress(*CORRUPT):
             if file[at] == Opcode.CHUNK:
                 return end if content_of(content) else 0
-            if not self._is_head(end):
+            if end > len(file) or not self._is_head(end):
                 return 0
             if file[at] == Opcode.METADATA:
                 return end if self._keep(records.Metadata.read(stream(content))) else 0
@@ -153,7 +159,8 @@ class DamagedRecording:
         if file[at] == Opcode.CHUNK and end < done and self._is_head(end):
             what, times = "a chunk that fails its checksum", _CHUNK.unpack_from(file, at)[2:4]
         else:
-            starts = (found.start() for found in _KEPT.finditer(file, at + 1))
+            kept = _KEPT if self._chunked else _BARE_KEPT
+            starts = (found.start() for found in kept.finditer(file, at + 1))
             end = next((start for start in starts if self._end_of(start)), done)
             if end == done == len(file):
                 what = _CUT

@@ -17,6 +17,12 @@ import numpy as np
 from numpy.lib.npyio import NpzFile
 from numpy.typing import NDArray
 
+# Bytes of all arrays together: at most so many, and so many times those of their file. What a walk
+# measures packs to a half; only much of nothing packs to less than a twentieth.
+_LARGEST: Final = 1 << 31
+_UNPACKED: Final = 20
+_ALWAYS: Final = 1 << 26  # so many are read of the smallest file
+_ARCHIVE: Final = b"PK\x03\x04"  # else NumPy takes it for a bare array, of any size
 GREATEST: Final = 1e15  # that anything measured can be, whatever its unit
 _NUMBERS: Final = "fiu"  # NumPy's kinds of types
 
@@ -66,10 +72,17 @@ def open_npz(path: Path) -> Iterator[NpzFile]:
     """The archive of arrays in a file; they are read when they are asked for.
 
     Raises:
-        one of UNREADABLE: no such file, no archive, or one that is damaged.
+        one of UNREADABLE: no such file, no archive, one that is damaged, or one that unpacks to
+            more than it should.
     """
     # An own handle: NumPy leaves its open when the archive turns out to be broken.
     with path.open("rb") as file, warnings.catch_warnings():
         warnings.simplefilter("error")  # of a header that is not as NumPy writes it
+        if file.read(len(_ARCHIVE)) != _ARCHIVE:
+            raise ValueError("no archive of arrays")
+        file.seek(0)
         with np.load(file, allow_pickle=False) as archive:
+            size = sum(member.file_size for member in archive.zip.infolist())
+            if size > min(_LARGEST, _ALWAYS + _UNPACKED * path.stat().st_size):
+                raise ValueError(f"arrays of {size:,} bytes")
             yield archive

@@ -20,7 +20,7 @@ from quadriga.team.controller_program import become_controller, check_controller
     ],
 )
 def test_what_cannot_be_started_is_told_at_once(line: str, message: str) -> None:
-    with pytest.raises(ConfigError, match=r"^team\.controller: ") as error:
+    with pytest.raises(ConfigError, match=r"^team\.agent_command: ") as error:
         check_controller(load(None, {"team.agent_command": line}))
     assert message in str(error.value)
 

@@ -5,7 +5,10 @@ from __future__ import annotations
 import os
 import shutil
 import signal
+import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -168,3 +171,30 @@ def test_the_table_starts_everyone_once_and_stops_the_recorder_last() -> None:
     alone = process_table(load(None, {"recorder.enabled": False}), Path("run"), None, "")
     assert "recorder" not in [row.name for row in alone]
     assert "--predictor" not in alone[1].command
+
+
+@pytest.fixture
+def full_disk(tmp_path: Path) -> Iterator[Path]:
+    """A folder on a disk of its own on which nothing more can be written."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    made = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(folder)],
+        capture_output=True,
+        check=False,
+    )
+    if made.returncode:
+        pytest.skip("disks are mounted by root alone")
+    (folder / "sim.log").touch()
+    with suppress(OSError), (folder / "filled").open("wb", buffering=0) as file:
+        while True:
+            file.write(bytes(4096))
+    yield folder
+    subprocess.run(["umount", str(folder)], check=True)
+
+
+def test_a_process_that_could_not_say_that_the_disk_is_full_is_spoken_for(full_disk: Path) -> None:
+    code = "import sys; print('the recording cannot be written'); sys.exit(2)"
+    match = r"process sim: got exit status \d+, expected .*\n  \(none: the disk is full\)"
+    with Launch([row("sim", code)], full_disk) as running, pytest.raises(ProcessError, match=match):
+        running.watch(never)

@@ -13,6 +13,8 @@ from quadriga.shared.errors import ConfigError
 from quadriga.sim_server.world.world import World
 from quadriga.team.plants import plant_factory, plant_kinds
 
+EACH = {"team.robots": 2, "team.plant_per_robot": True, "world.mode": "realtime"}
+
 
 @pytest.fixture
 def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
@@ -61,7 +63,7 @@ def test_a_kind_that_is_not_there_is_one_error(kind: str, words: str) -> None:
 )
 def test_what_plants_of_one_robot_cannot_do_is_refused(keys: dict[str, str], words: str) -> None:
     with pytest.raises(ConfigError) as caught:
-        load(None, {"team.robots": 2, "team.plant_per_robot": True, **keys})
+        load(None, {**EACH, **keys})
     assert words in str(caught.value)
 
 
@@ -70,8 +72,8 @@ def test_what_plants_of_one_robot_cannot_do_is_refused(keys: dict[str, str], wor
     [
         {"team.yokes": "none"},
         {"team.robots": 1},
-        {"team.plant": "unitree"},  # real robots are yoked whoever commands them
+        {"team.plant": "robots"},  # real robots are yoked whoever commands them
     ],
 )
 def test_plants_of_one_robot_walk_unyoked_alone_or_for_real(keys: dict[str, object]) -> None:
-    assert load(None, {"team.robots": 2, "team.plant_per_robot": True, **keys}).team.plant_per_robot
+    assert load(None, {**EACH, **keys}).team.plant_per_robot

@@ -37,7 +37,7 @@ PROMISED = {
 
 
 def test_what_would_begin_after_the_end_of_a_walk_is_told() -> None:
-    world = {"seconds": 0.5, "push": "r1:50:90:99:0.2", "faults": "r2/imu off 0.1 5"}
+    world = {"duration": 0.5, "push": "r1:50:90:99:0.2", "faults": "r2/imu off 0.1 5"}
     late = check_walk(build({"world": world}))
     assert [(event.kind, event.robot, event.tick) for event in late] == [("push", "r1", 99_000)]
 

@@ -152,6 +152,7 @@ VARIANTS = {
     "packed by nothing": {"compression": CompressionType.NONE},
     "without checksums": {"enable_crcs": False},
     "neither": {"compression": CompressionType.NONE, "enable_crcs": False},
+    "without chunks": {"use_chunking": False, "index_types": IndexType.NONE},
     "without a summary": {
         "index_types": IndexType.NONE,
         "repeat_channels": False,
@@ -193,18 +194,23 @@ def test_whatever_mcap_allows_is_read_and_recovered(
     assert found == list(range(recovery.messages if metadata else 0))
 
 
-def test_messages_outside_chunks_are_read_and_not_recovered(tmp_path: Path) -> None:
+def test_damage_among_messages_outside_chunks_costs_it_and_the_one_before(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     with path.open("wb") as file:
         writer = Writer(file, use_chunking=False, index_types=IndexType.NONE)
         writer.start(PROFILE)
         writer.add_metadata(PROFILE, seal(METADATA))
         channel = writer.register_channel("team/r1/state", "msgpack", 0)
-        for tick in range(20):
+        for tick in range(200):
             writer.add_message(channel, tick, encode(state(tick)), tick)
         writer.finish()
-    assert [entry.tick for entry in entries_of(path)] == list(range(20))
-    assert list(DamagedRecording(path).entries()) == []
+    content, before = bytearray(path.read_bytes()), entries_of(path)
+    at = content.index(before[100].payload)
+    content[at - 31 : at + 9] = b"\xff" * 40
+    salvage = DamagedRecording(damaged(path, bytes(content)))
+    # Nothing but what follows tells where a message ends.
+    assert list(salvage.entries()) == before[:99] + before[101:]
+    assert [damage.what for damage in salvage.damages] == ["no record begins here"]
 
 
 def test_no_more_is_unpacked_than_a_chunk_states() -> None:
