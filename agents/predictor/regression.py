@@ -253,7 +253,7 @@ class Reduction:
     The Cholesky factor of the data's Gram matrix S, inputs first, gives every g that matters as two
     orthogonal parts: one that a determines, with ‖·‖² = aᵀ S_aa⁻¹ a, and one of free coordinates z.
     At the optimum g has no part outside the span of the data's rows.
-    `quadriga.agents.planner.deepc_qp` makes the QP of this.
+    `quadriga.agents.planner.team` makes the QP of this.
 
     Attributes:
         layout: sizes of the problem, with L = T_ini + N, and the scales.
