@@ -13,6 +13,7 @@ from quadriga.agents.planner.solver import SOLVED
 from quadriga.agents.planner.team import TeamPlanner
 from quadriga.agents.planning.central import Central, CentralOutputs, CentralState
 from quadriga.agents.planning.interface import REFUSED
+from quadriga.agents.planning.references import AHEAD_MS
 from quadriga.agents.plausibility import is_within_limits
 from quadriga.agents.rehearsal import rehearse_central
 from quadriga.shared.bus.discovery import ProcessInfo, join
@@ -90,13 +91,13 @@ class _CentralShell:
         self._references: list[Reference] = []
         self._measurements: list[tuple[str, Measurement]] = []
         self._counters: Counter[str] = Counter()
-        self._ended = False  # the end of the walk has been announced
+        self._end = -1  # tick for which the end of the walk is announced; −1: for none
         self._tick = 0  # of the last plans
 
     def work(self, stopped: Callable[[], bool]) -> None:
         """Plan whenever a step is due until the walk is over."""
         state, since = CentralState(), monotonic()
-        while not (stopped() or self._lead.is_over(announced=self._ended)):
+        while not (stopped() or self._lead.is_over(announced=self._end >= 0)):
             packet = self._bus.get(POLL)
             if packet is None:
                 self._lead.poll(self._tick)
@@ -128,9 +129,14 @@ class _CentralShell:
         robot = self._robots.get(key)
         try:
             if robot is not None:
-                self._measurements.append((robot, decode(payload, Measurement)))
+                sample = decode(payload, Measurement)
+                self._measurements.append((robot, sample))
+                if sample.tick > self._end:
+                    self._end = -1
             elif key.endswith(EVENT.name):
-                self._ended = self._ended or decode(payload, Event).kind == "stop"
+                event = decode(payload, Event)
+                if event.kind == "stop":
+                    self._end = min(event.tick, self._tick + AHEAD_MS)
             else:
                 reference = decode(payload, Reference)
                 if not is_within_limits(reference):

@@ -26,7 +26,7 @@ from quadriga.shared.runtime.scheduling import end_collection, leave_priority, t
 from quadriga.shared.runtime.signals import interruptible, stop_on_signals
 from quadriga.shared.topics import COMMAND
 
-_ALL_STOP: Final = 0.3  # s, in which a team is stopped whose processes get the signal one by one
+_ALL_STOP: Final = 1.0  # s, in which a team is stopped whose processes get the signal one by one
 _PAUSE: Final = 0.002  # s, between two looks of a simulated robot's plant that waits
 
 # What was expected, and what the cause may be, by the code of an end.

@@ -66,7 +66,6 @@ class Inbox:
         received: valid messages by topic and sender.
         refused: whether a valid message that is no state was refused: too many were held, or it
             is of a time too far ahead.
-        ended: whether the end of the walk has been announced.
     """
 
     def __init__(self, config: Config, robot: str, peers: Sequence[str]) -> None:
@@ -93,7 +92,8 @@ class Inbox:
             self.topics[MEASUREMENT.key(team, peer)] = (MEASUREMENT, peer)
         self.counters: Counter[str] = Counter()
         self.received: Counter[Source] = Counter()
-        self.refused = self.ended = False
+        self.refused = False
+        self._end = -1  # tick for which the end of the walk is announced; −1: for none
         self._newest: dict[Source, Order] = {}
         self._held: dict[str, list[tuple[str, Any]]] = {}  # sender and message by topic
         self._count: Counter[Source] = Counter()  # of these
@@ -149,7 +149,8 @@ class Inbox:
             if topic is RESET:
                 self._released = message
         elif isinstance(message, Event):
-            self.ended = self.ended or message.kind == "stop"
+            if message.kind == "stop":
+                self._end = min(message.tick, max(self._newest_state, 0) + AHEAD_MS)
         else:
             source = (topic.name, sender)
             if self._count[source] >= self._most:
@@ -165,12 +166,19 @@ class Inbox:
             self.counters["states_passed_over"] += 1
             return
         self._newest_state = state.tick
+        if state.tick > self._end:
+            self._end = -1
         passed = self._state
         if passed is not None and passed.tick % SAMPLE_MS == 0:
             passed, self._sample_end = self._sample_end, passed
         if passed is not None:
             self.counters["states_passed_over"] += 1
         self._state = state
+
+    @property
+    def ended(self) -> bool:
+        """Whether the end of the walk has been announced, and time has not gone on since."""
+        return self._end >= 0
 
     @property
     def has_state(self) -> bool:

@@ -73,6 +73,7 @@ def describe_outcome(
     others = [name for name in traces.robots if name != moment.robot]
     recorded_end = next((e for e in reversed(traces.events) if e.kind == "stop"), None)
     end = recorded_end or next((e for e in reversed(events) if e.kind == "stop"), None)
+    goes_on = recorded_end is not None and recorded_end.code != codes.COMMAND_LOST
     last = {name: s[-1] for name, s in traces.statuses.items() if s}
     return {
         "robot": moment.robot,
@@ -84,7 +85,7 @@ def describe_outcome(
         "lost": _lost_robots(traces.robots, end),
         "detect_ms": _first_notice(traces, events, moment, tick, missed),
         "stand_ms": _after(tick, _all_stand(traces.statuses, others, tick)),
-        "recover_ms": None if recorded_end is None else _after(tick, _all_walk(traces, tick)),
+        "recover_ms": _after(tick, _all_walk(traces, tick)) if goes_on else None,
         "lost_messages": _count_lost(config, traces, moment),
         "status": {name: f"{s.mode} {s.reason}".strip() for name, s in last.items()},
         "end": "none announced" if end is None else f"{end.code}: {end.detail}",
@@ -167,7 +168,7 @@ def _lost_robots(robots: Sequence[str], end: Event | None) -> list[str]:
     """Robots without whose commands the walk ended."""
     if end is None or end.code != codes.COMMAND_LOST:
         return []
-    return [name for name in robots if name in re.split(r"[, ]+", end.detail)]
+    return [name for name in robots if name in re.split(r"[, ]+", end.detail.partition(";")[0])]
 
 
 def _after(tick: int, later: int | None) -> int | None:

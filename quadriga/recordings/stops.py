@@ -28,6 +28,7 @@ def _find_lost(traces: Traces) -> dict[str, str]:
             lost[name] = with_detail(COMMAND_LOST, "it has never sent a command")
     for event in traces.events:
         if event.code == COMMAND_LOST:
-            named = set(re.split(r"[, ]+", event.detail)).intersection(traces.robots)
-            lost |= dict.fromkeys(named, with_detail(event.code, event.detail))
+            said = event.detail.partition(";")[0]  # what follows tells how late the others were
+            named = set(re.split(r"[, ]+", said)).intersection(traces.robots)
+            lost |= dict.fromkeys(named, with_detail(event.code, said))
     return lost

@@ -133,7 +133,10 @@ def test_without_the_package_a_recording_says_what_is_missing(
             timeout=100,
         )
         assert done.returncode == status
-    assert "planner.kind: got 'balance', expected a kind that is installed" in done.stderr
+    assert (
+        "planner.kind: got 'balance', expected an installed kind (install quadriga-balance"
+        in done.stderr
+    )
     assert "install quadriga-balance 0.1.0" in done.stderr
 
 

@@ -108,8 +108,8 @@ def test_a_robot_stands_up_walks_and_lies_down_through_its_own_protocol(
     said = (out / "logs" / "plant_r1.log").read_text(encoding="utf-8")
     ways = ["r1: standing-up", "r1: stand", "r1: walk"]
     # Where a busy machine gives it too little time it stops, with a reason: a good end, too.
-    stopped = "r1: stopped " in said or "r1 stopped" in done.stdout
-    ways += [] if "r1: stopped " in said else ["r1: lying-down", "r1: releasing", "r1: passive"]
+    stopped = "r1: estop " in said or "r1 stopped" in done.stdout
+    ways += [] if "r1: estop " in said else ["r1: lying-down", "r1: releasing", "r1: passive"]
     assert [way for way in ways if way in said] == ways, said
     assert stopped or done.returncode == 0, done.stdout + done.stderr
     recording = Recording(out / "run.mcap")
@@ -142,18 +142,18 @@ def test_a_bridge_hears_the_emergency_stop_whatever_its_agent_does(
     command += ["--armed", "--seconds", "60"]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as walking:
         said = out / "logs" / "plant_r1.log"
-        wait_until(lambda: said.is_file() and "r1: walking" in said.read_text(encoding="utf-8"))
+        wait_until(lambda: said.is_file() and "r1: walk" in said.read_text(encoding="utf-8"))
         agent = process_of(out, "r1")
         with Bus.open(config.bus, config.team.name, members.ESTOP) as bus:
             put = bus.publisher(ESTOP.key(config.team.name))
             wait_until(lambda: "r1" in bus.members_at(HERE))
             os.kill(agent, signal.SIGSTOP)
             put(encode(EStop(0, 0, "dog")))  # long before the agent's silence stops the robot
-        wait_until(lambda: "r1: stopped " in said.read_text(encoding="utf-8"))
+        wait_until(lambda: "r1: estop " in said.read_text(encoding="utf-8"))
         wait_until(lambda: motors_of(log)[-1] == "motors off")
         os.kill(agent, signal.SIGKILL)
         walking.terminate()
-    assert "r1: stopped estop:dog" in said.read_text(encoding="utf-8")
+    assert "r1: estop estop:dog" in said.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("config", ["a1"], indirect=True)
@@ -195,7 +195,7 @@ def test_a_bridge_that_dies_or_hangs_leaves_a_robot_that_is_damped_and_then_pass
     command += ["--armed", "--seconds", "60"]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as walking:
         said = out / "logs" / "plant_r1.log"
-        wait_until(lambda: said.is_file() and "r1: walking" in said.read_text(encoding="utf-8"))
+        wait_until(lambda: said.is_file() and "r1: walk" in said.read_text(encoding="utf-8"))
         assert motors_of(log)[-1] == "motors driven"
         bridge = process_of(out, "plant_r1")
         os.kill(bridge, number)
@@ -204,7 +204,7 @@ def test_a_bridge_that_dies_or_hangs_leaves_a_robot_that_is_damped_and_then_pass
         wait_until(lambda: watchdogs() <= before)  # it leaves by itself
         if number is signal.SIGSTOP:
             os.kill(bridge, signal.SIGCONT)
-            wait_until(lambda: "r1: stopped " in said.read_text(encoding="utf-8"))
+            wait_until(lambda: "r1: estop " in said.read_text(encoding="utf-8"))
         walking.terminate()
 
 
