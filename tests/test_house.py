@@ -25,7 +25,7 @@ BUDGETS: Final[Mapping[str, int]] = {
     "shared": 9_560,  # planned: 7,200; left: the MCAP writer, the barrier, 640 lines of keys
     "quadriga": 40_940,  # planned: 18,200; left: harnesses of experiments, report, commands
     "benchmarks": 4_300,  # planned: 1,800
-    "tests": 49_330,  # planned: 28,000
+    "tests": 49_350,  # planned: 28,000
 }
 COUNTED: Final = (".py", ".js", ".css", ".html")
 MOST_ARGUMENTS: Final = 8

@@ -70,7 +70,7 @@ def test_a_killed_agent_and_a_dead_knee(tmp_path: Path) -> None:
     assert [(event.code, event.robot) for event in told] == [(FAULT_BEGINS, killed["robot"])]
     assert abs(told[0].tick - killed["tick"]) < 1000
     assert told[0].detail == "agent-killed"
-    assert killed["doctor"] == {killed["robot"]: "not-started"}
+    assert killed["end"].startswith("command-lost: ")
     # Half a second without a knee: the robot falls, or limps on; nobody else is touched by it.
     assert set(knee["falls"]) <= {knee["robot"]}
     # What has been walked is not walked again.
