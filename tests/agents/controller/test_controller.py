@@ -79,7 +79,7 @@ def test_planned_deviations_are_asked_of_the_stance_feet_in_the_yaw_frame() -> N
     solution = robot.step(command=replace(REST, deviation=deviation), truth=truth)
     expected = deviation.reshape(4, 3) @ pin.utils.rotate("z", yaw).T
     expected[:, 2] += TOTAL_MASS * GRAVITY / 4
-    np.testing.assert_allclose(solution.force, expected, atol=0.05)
+    np.testing.assert_allclose(solution.force, expected, atol=0.02)
 
 
 def test_nothing_is_asked_of_legs_scheduled_to_swing() -> None:
