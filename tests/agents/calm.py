@@ -73,3 +73,17 @@ def plan(
     planner = Planner(config, 0, predictor)
     terms = terms_of(config, planner, *peers, base=base)
     return planner.step(planner.initial(), inputs, terms)[1]
+
+
+def team_cost(
+    config: Config, predictor: Predictor, inputs: list[PlannerInputs], du: Array
+) -> float:
+    """Eq. 7 written out: tracking of all robots and effort. du of shape (n, N, 12)."""
+    z = np.stack([np.concatenate([r.past(), f.ravel()]) for r, f in zip(inputs, du, strict=True)])
+    y = predictor.predict(z).reshape(len(inputs), -1, 6)
+    total = 0.0
+    for robot, predicted, forces in zip(inputs, y, du, strict=True):
+        error = robot.y_base + predicted - robot.y_des
+        total += float((error**2 @ config.planner.Q).sum())
+        total += float((forces.reshape(-1, 4, 3) ** 2 @ config.planner.R).sum())
+    return total

@@ -24,7 +24,7 @@ from quadriga.agents.planner.cooperation import (
     team_hessian,
 )
 from quadriga.agents.planner.peers import PeerData, PeerSelection
-from quadriga.agents.planner.planner import Planner, PlannerInputs
+from quadriga.agents.planner.planner import Planner
 from quadriga.agents.planner.team import build_centralised
 from quadriga.agents.predictor.gates import are_same_costs, iteration_radius, probe_costs, run_gates
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
@@ -33,7 +33,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError, PredictorError
 from quadriga.shared.robots.conventions import Array
 from tests.a1 import nominal_forces
-from tests.agents.calm import BASE, STEP, Team, inputs_of, peer, terms_of
+from tests.agents.calm import BASE, STEP, Team, inputs_of, peer, team_cost, terms_of
 from tests.agents.conftest import fit_ridge
 
 ROUNDS = 200  # within which strongly coupled plans are as good as the central planner's
@@ -119,19 +119,6 @@ class Round:
             y_ini=own.y_ini,
             du=self.du[j],
         )
-
-
-def team_cost(
-    config: Config, predictor: Predictor, inputs: list[PlannerInputs], du: Array
-) -> float:
-    z = np.stack([np.concatenate([r.past(), f.ravel()]) for r, f in zip(inputs, du, strict=True)])
-    y = predictor.predict(z).reshape(len(inputs), -1, 6)
-    total = 0.0
-    for robot, predicted, forces in zip(inputs, y, du, strict=True):
-        error = robot.y_base + predicted - robot.y_des
-        total += float((error**2 @ config.planner.Q).sum())
-        total += float((forces.reshape(-1, 4, 3) ** 2 @ config.planner.R).sum())
-    return total
 
 
 @given(seed=st.integers(0, 2**32 - 1), n=st.integers(2, 4), rows=st.integers(1, 30))

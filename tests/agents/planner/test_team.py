@@ -19,6 +19,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robots.conventions import Array
 from tests.a1 import WEIGHT, nominal_forces
+from tests.agents.calm import team_cost
 from tests.agents.conftest import fit_ridge
 
 BASE = np.array([0.26, 0.4, 0.0, 0.0, 0.0, 0.1])
@@ -51,18 +52,6 @@ def disturbed(config: Config, seed: int, size: float = 1.0) -> list[PlannerInput
     ]
 
 
-def cost(config: Config, predictor: Predictor, inputs: list[PlannerInputs], du: Array) -> float:
-    """Eq. 7 written out: tracking of all robots and effort. du of shape (n, N, 12)."""
-    z = np.stack([np.concatenate([r.past(), f.ravel()]) for r, f in zip(inputs, du, strict=True)])
-    y = predictor.predict(z).reshape(len(inputs), -1, 6)
-    total = 0.0
-    for robot, predicted, forces in zip(inputs, y, du, strict=True):
-        error = robot.y_base + predicted - robot.y_des
-        total += float((error**2 @ config.planner.Q).sum())
-        total += float((forces.reshape(-1, 4, 3) ** 2 @ config.planner.R).sum())
-    return total
-
-
 @pytest.mark.parametrize(("seed", "size"), [(0, 0.2), (1, 1.0), (2, 3.0)])
 def test_no_feasible_change_of_the_forces_is_better(
     small: Config, predictor: Predictor, seed: int, size: float
@@ -74,7 +63,7 @@ def test_no_feasible_change_of_the_forces_is_better(
     stance = np.stack([horizon_stance(small, i, STEP) for i in range(2)])
     du = result.u - nominal_forces(stance)
     rng = np.random.default_rng(seed)
-    best, c = cost(small, predictor, inputs, du), small.planner.mu / np.sqrt(2.0)
+    best, c = team_cost(small, predictor, inputs, du), small.planner.mu / np.sqrt(2.0)
     mask = np.repeat(stance, 3, axis=2)
     tried = 0
     for _ in range(300):
@@ -84,7 +73,7 @@ def test_no_feasible_change_of_the_forces_is_better(
         within = np.abs(other.reshape(-1, 3)) <= small.planner.deviation_max
         if within.all() and (np.maximum(abs(fx), abs(fy)) <= c * fz).all() and (fz >= 0).all():
             tried += 1
-            assert cost(small, predictor, inputs, other) >= best * (1.0 - 1e-12)
+            assert team_cost(small, predictor, inputs, other) >= best * (1.0 - 1e-12)
     assert tried > 10 or size > 2.0
 
 
