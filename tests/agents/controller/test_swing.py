@@ -19,8 +19,8 @@ from quadriga.agents.controller.swing import (
 )
 from quadriga.shared.robots.a1 import A1
 from quadriga.shared.robots.conventions import Array
-from tests.a1 import FOOT_RADIUS, TOTAL_MASS
-from tests.agents.estimator.poses import gains_of, random_pose, standing_pose
+from tests.a1 import FOOT_RADIUS
+from tests.agents.estimator.poses import BODY, gains_of, random_pose, standing_pose
 
 START, TARGET = np.array([0.1, -0.2, 0.03]), np.array([0.25, -0.15])
 GROUND, APEX, DURATION = 0.01, 0.12, 0.2
@@ -123,9 +123,9 @@ def test_the_foothold_is_raiberts_and_no_farther_inwards_than_the_limit(
     expected += gains.raibert_gain * v_error
     side = np.sign(A1.feet_under_hips[leg][1])
     forwards, left = turn[:2, :2].T @ (expected - (pose.position + arm)[:2])
-    left = side * max(side * left, -limit * (1.0 + payload / TOTAL_MASS))
+    left = side * max(side * left, -limit * (1.0 + payload / BODY.mass))
     expected = (pose.position + arm)[:2] + turn[:2, :2] @ [forwards, left]
-    np.testing.assert_allclose(foothold(pose, wz, gains, leg), expected, atol=1e-4 * limit + 1e-12)
+    np.testing.assert_allclose(foothold(pose, wz, gains, leg), expected, atol=1e-12)
 
 
 def swinging(**controller: Any) -> tuple[Any, Any]:
