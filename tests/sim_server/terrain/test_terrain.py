@@ -13,12 +13,13 @@ import pytest
 from quadriga.shared.config.reference_trace import inline_trace
 from quadriga.shared.config.sections import Config, ReferenceConfig
 from quadriga.shared.config.terrains import TERRAINS
-from quadriga.shared.robots.conventions import Array
+from quadriga.shared.robots.conventions import GRAVITY, Array
 from quadriga.sim_server.terrain.ground import BoxTerrain, HeightField
 from quadriga.sim_server.terrain.terrain import Course, Terrain, build_course
 from quadriga.sim_server.world.scenario import build_loads, build_scenario
 from quadriga.sim_server.world.team_model import build_team_model, build_terrain, formation
 from quadriga.sim_server.world.world import World
+from tests.a1 import TOTAL_MASS
 from tests.sim_server.standing import configured, shift, stand
 
 KINDS = ("boxes", "gravel", "heightfield", "slope")
@@ -61,7 +62,9 @@ def test_every_row_is_built_announced_and_stood_on(kind: str) -> None:
     shift(world, dx=2.0, dz=terrain.top + 0.03)
     stand(world, 400)
     assert world.fallen() == ()
-    height = world.truth().base_pos[0, 2]
+    truth, weight = world.truth(), config.team.robots * TOTAL_MASS * GRAVITY
+    assert truth.grf[:, :, 2].sum() == pytest.approx(weight, rel=0.02)
+    height = truth.base_pos[0, 2]
     assert 0.23 + (0.06 if kind == "stairs" else 0.0) < height < 0.29 + terrain.top
     stones = terrain.stones_near(np.array([2.0, 0.0]), 2000)
     assert (len(stones.poses) > 0) == terrain.loose
