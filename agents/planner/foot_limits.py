@@ -20,7 +20,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quadriga.agents.planner.qp import is_optimal, largest_residuals
+from quadriga.agents.planner.qp import Residuals, is_optimal, largest_residuals
 from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.jit import compiled
 
@@ -42,6 +42,7 @@ class ForceQp(NamedTuple):
         lower, upper: bounds of [v; A v], (nv + 4 nv / 3,): the box, then c n for the four sides of
             each foot's pyramid, which no lower bound holds.
         slope: c, positive.
+        exact: bound of the stationarity of −H⁻¹ f for every f.
     """
 
     H: Array
@@ -49,6 +50,7 @@ class ForceQp(NamedTuple):
     lower: Array
     upper: Array
     slope: float
+    exact: float
 
 
 class _Faces(NamedTuple):
@@ -71,37 +73,21 @@ class Minimum(NamedTuple):
     Attributes:
         v: forces, (nv,), N.
         multipliers: of [v; A v], positive for upper bounds.
-        stationarity, primal, complementarity: see `Residuals`; 0 of −H⁻¹ f.
+        residuals: of −H⁻¹ f a bound of them.
         solutions: how many QPs on faces it took, 0 of −H⁻¹ f; `FAILED`: no minimiser was found.
     """
 
     v: Array
     multipliers: Array
-    stationarity: float
-    primal: float
-    complementarity: float
+    residuals: Residuals
     solutions: int
-
-
-def has_foot_limits(qp: ForceQp) -> bool:
-    """Whether its bounds are such limits of feet, and leave each foot some force."""
-    nv, low, high = len(qp.H), qp.lower[: len(qp.H)], qp.upper[: len(qp.H)]
-    if 3 * len(qp.upper) != 7 * nv or not (high >= low).all():
-        return False
-    sideways = (low[0::3] == -high[0::3]).all() and (low[1::3] == -high[1::3]).all()
-    return bool(sideways and (qp.upper[nv::4] + qp.slope * low[2::3] >= 0.0).all())
 
 
 @compiled
 def minimise(qp: ForceQp, f: Array) -> Minimum:
-    """The minimiser: −H⁻¹ f if that keeps the limits, else by Newton's method.
-
-    Args:
-        qp: what does not depend on f.
-        f: linear term, (nv,).
-    """
+    """The minimiser for f, (nv,): −H⁻¹ f if that keeps the limits, else by Newton's method."""
     # Unpacked before the loops: each access to a tuple in a loop costs a reference count.
-    H, minus_inverse, lower, upper, slope = qp
+    H, minus_inverse, lower, upper, slope, exact = qp
     nv = len(f)
     free = minus_inverse @ f
     inside = True
@@ -112,7 +98,7 @@ def minimise(qp: ForceQp, f: Array) -> Minimum:
         inside = inside and abs(free[3 * foot]) <= limit and abs(free[3 * foot + 1]) <= limit
     nothing = np.zeros(len(upper))
     if inside:
-        return Minimum(free, nothing, 0.0, 0.0, 0.0, 0)
+        return Minimum(free, nothing, Residuals(exact, 0.0, 0.0), 0)
     solutions = _MOST if np.isfinite(np.dot(f, f)) else 0
     metric = np.empty(nv)
     for i in range(nv):
@@ -120,10 +106,10 @@ def minimise(qp: ForceQp, f: Array) -> Minimum:
     faces = _Faces(np.zeros(nv), np.zeros(nv, dtype=np.bool_), np.zeros(nv))
     v, gradient = free, np.zeros(nv)
     for solution in range(solutions):
-        off = _project(v, gradient, metric, lower, upper, slope, faces)
+        off = _project(v, gradient, metric, qp, faces)
         if off <= _CLOSE:
-            found = _with_proof(H, f, v, lower, upper, slope, faces, solution)
-            if is_optimal(found.primal, found.stationarity):
+            found = _with_proof(qp, f, v, faces, solution)
+            if is_optimal(found.residuals):
                 return found
             break
         count = 0
@@ -135,21 +121,13 @@ def minimise(qp: ForceQp, f: Array) -> Minimum:
             v, gradient = _move_along(H, f, faces, nv - count)
         if not np.isfinite(v.sum()):
             break
-    return Minimum(np.zeros(nv), nothing, np.inf, np.inf, np.inf, FAILED)
+    return Minimum(np.zeros(nv), nothing, Residuals(np.inf, np.inf, np.inf), FAILED)
 
 
 @compiled
-def _project(
-    v: Array,
-    gradient: Array,
-    metric: Array,
-    lower: Array,
-    upper: Array,
-    slope: float,
-    faces: _Faces,
-) -> float:
+def _project(v: Array, gradient: Array, metric: Array, qp: ForceQp, faces: _Faces) -> float:
     """Fill the faces of P(v − S gradient); the largest distance of v from it, N."""
-    tilt, fixed, value = faces
+    (tilt, fixed, value), (_, _, lower, upper, slope, _) = faces, qp
     off, nv = 0.0, len(v)
     for i in range(0, nv, 3):
         x = v[i] - metric[i] * gradient[i]
@@ -299,50 +277,41 @@ def _gram(K: Array, rows: Array, places: NDArray[np.int64], sign: float) -> Arra
 
 
 @compiled
-def _with_proof(
-    H: Array,
-    f: Array,
-    v: Array,
-    lower: Array,
-    upper: Array,
-    slope: float,
-    faces: _Faces,
-    solutions: int,
-) -> Minimum:
+def _with_proof(qp: ForceQp, f: Array, v: Array, faces: _Faces, solutions: int) -> Minimum:
     """The minimiser v on its faces with the multipliers that hold it there, and their residuals."""
-    nv = len(f)
-    Hv = H @ v
+    (H, _, lower, upper, slope, _), (tilt, fixed, value) = qp, faces
+    nv, Hv = len(f), H @ v
     multipliers, pull, values = np.zeros(len(upper)), np.zeros(nv), np.empty(len(upper))
     values[:nv] = v
     for i in range(0, nv, 3):
         row = nv + 4 * (i // 3)
-        height, reach = faces.value[i + 2], upper[row] + slope * faces.value[i + 2]
+        height, reach = value[i + 2], upper[row] + slope * value[i + 2]
         # Held where the pyramid reaches the box: its sides bear what z asks for, the box the rest.
-        jump = faces.fixed[i + 2] and lower[i + 2] < height < upper[i + 2]
+        jump = fixed[i + 2] and lower[i + 2] < height < upper[i + 2]
         x, y = -(Hv[i] + f[i]), -(Hv[i + 1] + f[i + 1])
-        x_jumps = jump and faces.fixed[i] and abs(reach - upper[i]) <= _CLOSE
-        y_jumps = jump and faces.fixed[i + 1] and abs(reach - upper[i + 1]) <= _CLOSE
-        x_side = abs(x) if faces.tilt[i] != 0.0 and not x_jumps else 0.0
-        y_side = abs(y) if faces.tilt[i + 1] != 0.0 and not y_jumps else 0.0
+        x_jumps = jump and fixed[i] and abs(reach - upper[i]) <= _CLOSE
+        y_jumps = jump and fixed[i + 1] and abs(reach - upper[i + 1]) <= _CLOSE
+        x_side = abs(x) if tilt[i] != 0.0 and not x_jumps else 0.0
+        y_side = abs(y) if tilt[i + 1] != 0.0 and not y_jumps else 0.0
         z = -(Hv[i + 2] + f[i + 2]) + slope * (x_side + y_side)
         if x_jumps:
             x_side = min(abs(x), max(0.0, -z / slope))
             z += slope * x_side
         if y_jumps:
             y_side = min(abs(y), max(0.0, -z / slope))
-        if faces.fixed[i + 2] and not jump:
+        if fixed[i + 2] and not jump:
             multipliers[i + 2] = z
         for axis, force, side in ((0, x, x_side), (1, y, y_side)):
             sign = 1.0 if force > 0.0 else -1.0
-            if faces.fixed[i + axis]:
+            if fixed[i + axis]:
                 multipliers[i + axis] = force - sign * side
             multipliers[row + 2 * axis + (force < 0.0)] = side
             pull[i + axis] = sign * side
             pull[i + 2] -= slope * side
             values[row + 2 * axis] = v[i + axis] - slope * v[i + 2]
             values[row + 2 * axis + 1] = -v[i + axis] - slope * v[i + 2]
-    figures = largest_residuals(Hv, f, pull, values, multipliers, lower, upper)
-    return Minimum(v, multipliers, figures[0], figures[1], figures[2], solutions)
+    proof = largest_residuals(Hv, f, pull, values, multipliers, lower, upper)
+    return Minimum(v, multipliers, proof, solutions)
 
 
 @compiled

@@ -10,7 +10,7 @@ formulation (local eq. 12, centralised eq. 7, DeePC eq. 5) is such a `Condensed`
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,6 @@ from quadriga.agents.gait import nominal_forces
 from quadriga.shared.config.sections import PlannerConfig
 from quadriga.shared.robots.conventions import N_FORCES, N_OUTPUTS, Array
 from quadriga.shared.runtime.jit import compiled
-from quadriga.shared.runtime.record import record
 
 NO_BOUNDS: Final = "none"
 # An answer with larger residuals is not used, whatever status the solver reports.
@@ -96,13 +95,11 @@ class PlannerProblem:
 
     def bounds(self, error: Array | None = None) -> tuple[Array, Array]:
         """Bounds of [v; A v] for a free response that is off y_des by `error`, shape (p N,)."""
-        rows = len(self.bounded)
-        if not rows or error is None:
+        if not len(self.bounded) or error is None:
             return self.lower, self.upper
-        lower, upper = self.lower.copy(), self.upper.copy()
-        lower[-rows:] -= error[self.bounded]
-        upper[-rows:] -= error[self.bounded]
-        return lower, upper
+        shift = np.zeros(len(self.lower))
+        shift[-len(self.bounded) :] = error[self.bounded]
+        return self.lower - shift, self.upper - shift
 
 
 def condense(
@@ -134,12 +131,7 @@ def build_problem(
 ) -> PlannerProblem:
     """The QP of eq. 12 (one agent) or eq. 7 (a team) for one stance pattern of the horizon.
 
-    Args:
-        config: weights, friction, bounds.
-        weight: of one robot, N.
-        G_u: see `condense`.
-        stance: see `condense`.
-        G_past: see `condense`; None: without a past.
+    See `condense`; `weight` is that of one robot, N, and G_past None leaves the past out.
     """
     past = np.zeros((len(G_u), 0)) if G_past is None else G_past
     return constrain(config, weight, condense(config, past, G_u, stance), stance)
@@ -189,16 +181,11 @@ def unpack(problem: PlannerProblem, v: Array, y_free: Array) -> tuple[Array, Arr
     return du.reshape(-1, N_FORCES), dy.reshape(-1, N_OUTPUTS)
 
 
-# ---- how well an answer fulfils the Karush-Kuhn-Tucker conditions
-
-
-@record
-class Residuals:
+class Residuals(NamedTuple):
     """How well the Karush-Kuhn-Tucker conditions hold.
 
     Attributes:
-        stationarity: ‖H v + f + λ_box + Aᵀ λ_A‖∞ over the largest of its terms (at least 1); for
-            the closed form an upper bound of it.
+        stationarity: ‖H v + f + λ_box + Aᵀ λ_A‖∞ over the largest of its terms (at least 1).
         primal: largest violation of a bound [N].
         complementarity: largest |λ · distance to its bound|, over the same terms [N].
     """
@@ -209,34 +196,26 @@ class Residuals:
 
 
 @compiled
-def is_optimal(primal: float, stationarity: float) -> bool:
+def is_optimal(found: Residuals) -> bool:
     """Whether an answer with these residuals is used; not if one is NaN."""
-    return primal <= MAX_VIOLATION and stationarity <= MAX_STATIONARITY
+    return found.primal <= MAX_VIOLATION and found.stationarity <= MAX_STATIONARITY
 
 
 def residuals(
     problem: PlannerProblem, f: Array, v: Array, multipliers: Array, error: Array | None = None
 ) -> Residuals:
-    """Karush-Kuhn-Tucker residuals; positive multipliers belong to upper bounds.
-
-    Args:
-        problem: the QP.
-        f: linear term, (nv,).
-        v: answer, (nv,).
-        multipliers: of [v; A v], (nv + m,).
-        error: see `PlannerProblem.bounds`.
-    """
+    """Karush-Kuhn-Tucker residuals of an answer v; positive multipliers belong to upper bounds."""
     low, high = problem.bounds(error)
     values = np.concatenate([v, problem.A @ v])
     pull = problem.A.T @ multipliers[len(v) :]
-    return Residuals(*largest_residuals(problem.H @ v, f, pull, values, multipliers, low, high))
+    return largest_residuals(problem.H @ v, f, pull, values, multipliers, low, high)
 
 
 @compiled
 def largest_residuals(
     Hv: Array, f: Array, pull: Array, values: Array, multipliers: Array, low: Array, high: Array
-) -> tuple[float, float, float]:
-    """The figures of `Residuals` from H v, Aᵀ λ_A and [v; A v]; NaN if a number is."""
+) -> Residuals:
+    """Residuals from H v, Aᵀ λ_A and [v; A v]; NaN if a number is."""
     off = bent = asked = pulled = beyond = loose = 0.0
     for i in range(len(Hv)):
         total = multipliers[i] + pull[i]
@@ -249,7 +228,7 @@ def largest_residuals(
             bound = high[i] if multipliers[i] > 0.0 else low[i]
             loose = _worse(loose, abs(multipliers[i] * (values[i] - bound)))
     scale = max(1.0, bent, asked, pulled)
-    return off / scale, beyond, loose / scale
+    return Residuals(off / scale, beyond, loose / scale)
 
 
 @compiled

@@ -13,7 +13,7 @@ import numpy as np
 import osqp
 from scipy import linalg, sparse
 
-from quadriga.agents.planner.foot_limits import FAILED, ForceQp, has_foot_limits, minimise
+from quadriga.agents.planner.foot_limits import FAILED, ForceQp, minimise
 from quadriga.agents.planner.qp import (
     MAX_STATIONARITY,
     PlannerProblem,
@@ -71,24 +71,22 @@ class DaqpSolver:
     Attributes:
         force_qp: the QP without bounds of outputs, for compiled code.
         limits_feet: whether compiled code may answer: that is all there is to the QP.
-        exact: residuals of −H⁻¹ f, the optimum while no limit is active: bounds for any f.
     """
 
     def __init__(self, problem: PlannerProblem) -> None:
         self._problem = problem
         H, inverse = np.ascontiguousarray(problem.H), linalg.inv(problem.H)
         bounds = np.ascontiguousarray(problem.lower), np.ascontiguousarray(problem.upper)
-        self.force_qp = ForceQp(H, -inverse, *bounds, problem.slope)
-        self.exact = Residuals(_inversion_error(H, inverse), 0.0, 0.0)
-        usable = self.exact.stationarity <= MAX_STATIONARITY and not len(problem.bounded)
-        self.limits_feet = usable and has_foot_limits(self.force_qp)
+        exact = _inversion_error(H, inverse)
+        self.force_qp = ForceQp(H, -inverse, *bounds, problem.slope, exact)
+        feasible = bool((problem.lower <= problem.upper).all())
+        self.limits_feet = feasible and exact <= MAX_STATIONARITY and not len(problem.bounded)
         self._cold = np.zeros(len(problem.upper), dtype=np.int32)
         self._model = daqp.Model()
         self._model.settings = {"primal_tol": 1e-8}
-        zero = np.zeros(len(problem.H))
-        self._ready, _ = self._model.setup(
-            problem.H, zero, problem.A, *self._within_reach(None), self._cold
-        )
+        zero = np.zeros(len(H))
+        bounds = self._within_reach(None)
+        self._ready, _ = self._model.setup(problem.H, zero, problem.A, *bounds, self._cold)
         # The first solve loads the code, which must not fall into a walk.
         DaqpSolver.solve(self, zero)
         self._solve_by_daqp(zero, None)
@@ -103,9 +101,7 @@ class DaqpSolver:
         if self.limits_feet:
             found = minimise(self.force_qp, f)
             if found.solutions != FAILED:
-                proof = Residuals(found.stationarity, found.primal, found.complementarity)
-                proof = proof if found.solutions else self.exact
-                return QpSolution(SOLVED, found.v, found.multipliers, proof, found.solutions)
+                return QpSolution(SOLVED, *found)
         return self._solve_by_daqp(f, error)
 
     def _solve_by_daqp(self, f: Array, error: Array | None) -> QpSolution:
@@ -190,7 +186,7 @@ def judge(
     if status != SOLVED:
         return no_solution(problem, status)
     checked = residuals(problem, f, v, multipliers, error)
-    if not is_optimal(checked.primal, checked.stationarity):
+    if not is_optimal(checked):
         return replace(no_solution(problem, "inaccurate"), residuals=checked)
     return QpSolution(SOLVED, v, multipliers, checked, iterations)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import astuple, replace
+from dataclasses import replace
 
 import daqp
 import numpy as np
@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quadriga.agents.planner import solver as solvers
-from quadriga.agents.planner.foot_limits import FAILED, ForceQp, Minimum, has_foot_limits, minimise
+from quadriga.agents.planner.foot_limits import FAILED, Minimum, minimise
 from quadriga.agents.planner.qp import PlannerProblem, residuals
 from quadriga.agents.planner.solver import SOLVED, SOLVERS
 from quadriga.shared.config.sections import Config
@@ -38,13 +38,8 @@ def problem_of(
     return build_problem(planner, G, STANCE)
 
 
-def qp_of(problem: PlannerProblem) -> ForceQp:
-    inverse = np.asarray(np.linalg.inv(problem.H), dtype=np.float64)
-    return ForceQp(problem.H, -inverse, problem.lower, problem.upper, problem.slope)
-
-
 def minimum(problem: PlannerProblem, f: Array) -> Minimum:
-    return minimise(qp_of(problem), f)
+    return minimise(SOLVERS["daqp"](problem).force_qp, f)
 
 
 def by_daqp(problem: PlannerProblem, f: Array) -> Array:
@@ -79,9 +74,9 @@ def test_it_is_the_minimiser_of_a_dual_active_set_and_its_multipliers_prove_it(
     found = minimum(problem, f)
     assert found.solutions != FAILED
     np.testing.assert_allclose(found.v, by_daqp(problem, f), atol=1e-5)
-    checked = astuple(residuals(problem, f, found.v, found.multipliers))
+    checked = residuals(problem, f, found.v, found.multipliers)
     assert max(checked) < 1e-8
-    np.testing.assert_allclose(found[2:5], checked, atol=1e-10)
+    np.testing.assert_allclose(found.residuals, checked, atol=1e-10)
     values = np.concatenate([found.v, problem.A @ found.v])
     scale = max(1.0, float(np.abs(f).max()))
     assert (found.multipliers[values < problem.upper - 1e-6] <= 1e-9 * scale).all()
@@ -120,15 +115,3 @@ def test_what_is_not_finite_has_no_minimiser(bad: float) -> None:
     f = np.zeros(len(problem.H))
     f[3] = bad
     assert minimum(problem, f).solutions == FAILED
-
-
-def test_other_bounds_are_not_taken_for_limits_of_feet() -> None:
-    problem = problem_of(4)
-    lower, upper, nv = problem.lower, problem.upper, len(problem.H)
-    assert has_foot_limits(qp_of(problem))
-    none_left, lopsided, pulling = lower.copy(), lower.copy(), lower.copy()
-    none_left[2] = upper[2] + 1.0
-    lopsided[0] = lower[0] + 1.0
-    pulling[2] = -upper[nv] / problem.slope - 1.0
-    for other in (none_left, lopsided, pulling):
-        assert not has_foot_limits(qp_of(problem)._replace(lower=other))
