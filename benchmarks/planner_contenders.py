@@ -10,7 +10,8 @@ import numpy as np
 
 from benchmarks.as_written import DeepcQp, PaperQp
 from benchmarks.planner_ticks import PlanningTick
-from quadriga.agents.planner.planner import Planner
+from quadriga.agents.planner.peers import Peers
+from quadriga.agents.planner.planner import Planner, PlannerState
 from quadriga.agents.planner.qp import (
     PlannerProblem,
     build_problem,
@@ -85,6 +86,7 @@ class Local:
         self._G_u = [np.ascontiguousarray(predictor.block(i, i)[:, past:]) for i in robots]
         self._G_past = [np.ascontiguousarray(predictor.block(i, i)[:, :past]) for i in robots]
         self._planners = [Planner(config, i, predictor) for i in robots]
+        self._peers = [Peers(config, i, predictor) for i in robots]
         self._problems: dict[tuple[int, bytes], PlannerProblem] = {}
         self._solvers: dict[tuple[str, int, bytes], DaqpSolver] = {}
 
@@ -143,8 +145,9 @@ class Local:
     def _whole_tick(self, case: Case) -> Array:
         (i,), tick = case.robots, case.tick
         planner, inputs = self._planners[i], tick.inputs[i]
-        terms = planner.peer_terms(tick.selections[i], inputs.step, tick.base_before)
-        return planner.step(planner.initial(), inputs, terms)[1].du.ravel()
+        peers, step = tuple(peer for peer in tick.peers if peer.index != i), inputs.step
+        terms = self._peers[i].terms(peers, step, step - 1, tick.base_before)
+        return planner.step(PlannerState(), inputs, terms)[1].du.ravel()
 
     def _free(self, tick: PlanningTick, i: int) -> Array:
         """Eq. 11 without the robot's own future forces."""

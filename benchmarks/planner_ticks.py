@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadriga.agents.gait import horizon_stance, nominal_forces, step_ms
-from quadriga.agents.planner.peers import USABLE, PeerData, PeerSelection
+from quadriga.agents.planner.peers import USABLE, PeerData
 from quadriga.agents.planner.planner import PlannerInputs
 from quadriga.agents.predictor.episode import commanded_outputs, output_base
 from quadriga.agents.predictor.predictor import Predictor
@@ -31,7 +31,7 @@ class PlanningTick:
         y_des: desired outputs, (n, 6 N).
         before: windows that end at k−1 and plans of k−1, [u_ini; y_ini; u], (n, 18 T_ini + 12 N).
         inputs: each robot's own data for its planner.
-        selections: the peers' data for each robot's planner.
+        peers: all robots' data for their peers' planners.
         base_before: base of the outputs of the windows that end at k−1, (T_ini, 6).
     """
 
@@ -41,7 +41,7 @@ class PlanningTick:
     y_des: Array
     before: Array
     inputs: tuple[PlannerInputs, ...]
-    selections: tuple[PeerSelection, ...]
+    peers: tuple[PeerData, ...]
     base_before: Array
 
 
@@ -104,10 +104,7 @@ def _tick(
         y_des=np.tile((y_des - y_base).ravel(), (n, 1)),
         before=np.stack(before),
         inputs=inputs,
-        selections=tuple(
-            PeerSelection(tuple(peer for peer in peers if peer.index != i), step - 1)
-            for i in range(n)
-        ),
+        peers=tuple(peers),
         base_before=earlier[0].y_base_ini,
     )
 

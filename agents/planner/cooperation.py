@@ -24,22 +24,19 @@ so that w = 1/n always will do (Stewart, Venkat, Rawlings, Wright and Pannocchia
 distributed model predictive control, Systems & Control Letters 59, 2010). V is strictly convex and
 each agent's bounds are its own, so the limit is the optimum of eq. 7.
 
-What an agent has measured since its last plan its peers do not know yet, so nobody else reacts to
-it. Before it counts as the last plan, u_i is therefore moved by the agent's best reaction to that
+Peers do not know yet what an agent has measured since its last plan, so nobody else reacts to it.
+Before u_i counts as the last plan it is therefore moved by the agent's best reaction to that
 innovation, the difference δ between its window and the one that its last plan predicted:
-−D_i⁻¹ Σ_j G_jiᵀ Q̄ G_ji,past δ. Only what all know is answered with the share w. In an iteration on
-the same windows there is no innovation, and nothing of the above changes.
+−D_i⁻¹ Σ_j G_jiᵀ Q̄ G_ji,past δ. In an iteration on the same windows there is none.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import lru_cache
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import linalg
 from scipy.sparse.linalg import eigsh
 
@@ -60,15 +57,12 @@ OWN: Final = "own"  # values of planner.cost
 TEAM: Final = "team"
 _TOLERANCE: Final = 1e-6  # of the eigenvalues
 _BY_SIZE: Final = -1.0  # value of planner.damping
-_FREE: Final = {"usual": 3}  # robots whose plans converge undamped, by planner.preset
-_FREE_ELSE: Final = 2
 
 
 def is_cooperative(config: Config) -> bool:
     """Whether each agent of a team plans for all of it, knowing its peers' plans."""
-    planner = config.planner
-    several = config.team.robots > 1
-    return several and planner.cost == TEAM and find_kind(planner.kind).needs_peers
+    answers = config.team.robots > 1 and find_kind(config.planner.kind).needs_peers
+    return answers and config.planner.cost == TEAM
 
 
 def cost_of(config: Config) -> str:
@@ -99,21 +93,13 @@ def coupled_peers(config: Config, index: int, predictor: Predictor) -> frozenset
     return frozenset(np.flatnonzero(moves[moved].any(axis=0)).tolist()) - {index}
 
 
-def team_slope(
-    config: Config, predictor: Predictor, index: int, phase: int, stance: NDArray[np.bool_]
-) -> Array:
-    """[G_1i; …; G_ni]ᵀ Q̄ of the stance forces of agent i, the slope of V by team outputs.
-
-    Args:
-        config: weights and sizes.
-        predictor: of the team.
-        index: i, 0-based.
-        phase: chooses the transition matrix.
-        stance: of robot i over the horizon, (N, 4).
+def team_slope(config: Config, predictor: Predictor, index: int, step: int) -> Array:
+    """[G_1i; …; G_ni]ᵀ Q̄ of the stance forces of agent i at a step: the slope of V by team outputs.
 
     Returns:
         Shape (n, nv, 6 N), by robot whose outputs they are.
     """
+    phase, stance = phase_of(config, step, predictor.phases), horizon_stance(config, index, step)
     columns, Q = stance_columns(stance), np.tile(config.planner.Q, config.planner.N)
     blocks = [predictor.future_block(j, index, phase) for j in range(config.team.robots)]
     return np.stack([block[:, columns].T * Q for block in blocks])
@@ -127,16 +113,10 @@ def build_team_problem(
         H = Σ_j G_jiᵀ Q̄ G_ji + R̄,   f = Σ_j G_jiᵀ Q̄ (G_ji,past past_i − e) + Σ_l≠i M_il z_l
 
     The last sum comes from the peers (`peer_slope`). The predicted outputs are the agent's own.
-
-    Args:
-        config: the team's configuration.
-        predictor: of the team.
-        index: i, 0-based.
-        step: planning step, which chooses phase and stance.
     """
     phase, stance = phase_of(config, step, predictor.phases), horizon_stance(config, index, step)
     past, columns = predictor.meta.past, stance_columns(stance)
-    slopes = team_slope(config, predictor, index, phase, stance)
+    slopes = team_slope(config, predictor, index, step)
     F_past = np.zeros((len(columns), past))
     H = np.diag(np.tile(config.planner.R, len(columns) // 3))
     for j, slope in enumerate(slopes):
@@ -157,11 +137,7 @@ def build_team_problem(
 def peer_slope(slopes: Array, predictor: Predictor, peer: int, phase: int) -> Array:
     """M_il = Σ_j G_jiᵀ Q̄ G_jl of one peer l: what its z_l adds to f. (nv, 18 T_ini + 12 N).
 
-    Args:
-        slopes: `team_slope` of agent i.
-        predictor: of the team.
-        peer: l, 0-based.
-        phase: chooses the transition matrix.
+    `slopes` are the `team_slope` of agent i.
     """
     M = np.zeros((slopes.shape[1], predictor.meta.width))
     for j, slope in enumerate(slopes):
@@ -213,7 +189,7 @@ def stay_near_last(
         f: linear term of V by own stance forces, (nv,).
         w: share of the new plan.
         last: the last plan's deviations of these forces, (nv,), N.
-        innovation: δ, window less the one that the last plan predicted, (18 T_ini,).
+        innovation: δ, (18 T_ini,).
     """
     condensed = problem.condensed
     return w * f + (1.0 - w) * (condensed.F_past @ innovation - condensed.H @ last)
@@ -227,7 +203,9 @@ def new_plan_share(config: Config, predictor: Predictor) -> float:
     w = 2/(λ_min + λ_max). That is below 2/λ_max, so V falls with bounds, too. Of all planning
     steps the least w.
     """
-    return _choose_share(config, _eigenvalue_ranges(config, predictor))
+    if config.planner.damping > 0.0:
+        return 1.0 - config.planner.damping
+    return min(1.0, *(2.0 / sum(ends) for ends in _eigenvalue_ranges(config, predictor)))
 
 
 def cooperative_radius(config: Config, predictor: Predictor) -> float:
@@ -235,42 +213,15 @@ def cooperative_radius(config: Config, predictor: Predictor) -> float:
 
     Below 1 exactly where w < 2/λ_max, which is enough for convergence with bounds as well.
     """
-    ranges = _eigenvalue_ranges(config, predictor)
-    w = _choose_share(config, ranges)
+    w, ranges = new_plan_share(config, predictor), _eigenvalue_ranges(config, predictor)
     return max(abs(1.0 - w * end) for ends in ranges for end in ends)
 
 
-class _Same:
-    """A predictor that equals itself alone, whatever is in it."""
-
-    def __init__(self, predictor: Predictor) -> None:
-        self.predictor = predictor
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Same) and self.predictor is other.predictor
-
-    def __hash__(self) -> int:
-        return id(self.predictor)
-
-
+@lru_cache(maxsize=2)  # the agents in one process ask for the same
 def _eigenvalue_ranges(config: Config, predictor: Predictor) -> tuple[tuple[float, float], ...]:
-    """Of each distinct planning step; a memo: the agents in one process ask for the same."""
-    free = replace(config, world=Config().world, planner=replace(config.planner, damping=0.0))
-    return _compute_ranges(free, _Same(predictor))
-
-
-@lru_cache(maxsize=2)
-def _compute_ranges(config: Config, same: _Same) -> tuple[tuple[float, float], ...]:
-    return tuple(
-        eigenvalue_range(*team_hessian(config, same.predictor, step))
-        for step in distinct_steps(config, same.predictor.phases)
-    )
-
-
-def _choose_share(config: Config, ranges: Sequence[tuple[float, float]]) -> float:
-    if config.planner.damping > 0.0:
-        return 1.0 - config.planner.damping
-    return min(1.0, *(2.0 / (least + most) for least, most in ranges))
+    """Of each distinct planning step."""
+    steps = distinct_steps(config, predictor.phases)
+    return tuple(eigenvalue_range(*team_hessian(config, predictor, step)) for step in steps)
 
 
 # ---- damping of best responses, with the own cost
@@ -279,24 +230,21 @@ def _choose_share(config: Config, ranges: Sequence[tuple[float, float]]) -> floa
 def kept_share(config: Config) -> float:
     """d, the share of its own last plan that an agent's best response keeps.
 
-    If the size of the team chooses it: where n robots act on each other alike, with effects c of
-    their own, the undamped map has the eigenvalues c and −c (n − 1). Keeping d, the largest in size
-    is least at d = c (n − 2) / (2 + c (n − 2)), with c = 1/2 at (n − 2) / (n + 2). The gate on the
-    radius tells whether that is enough. Few robots converge without and are not damped.
+    By the size of the team: where n robots act on each other alike, with effects c of their own,
+    the undamped map has the eigenvalues c and −c (n − 1). Keeping d, the largest in size is least
+    at d = c (n − 2) / (2 + c (n − 2)), with c = 1/2 at (n − 2) / (n + 2). The gate on the radius
+    tells whether that is enough. Few robots converge without it.
     """
     planner, n = config.planner, config.team.robots
     if planner.output_bounds != NO_BOUNDS:  # a last plan may break them by now
         return 0.0
     if planner.damping != _BY_SIZE:
         return planner.damping
-    return 0.0 if n <= _FREE.get(planner.preset, _FREE_ELSE) else (n - 2) / (n + 2)
+    few = 3 if planner.preset == "usual" else 2
+    return 0.0 if n <= few else (n - 2) / (n + 2)
 
 
 def kept_by_agent(config: Config) -> float:
-    """`kept_share` of an agent of the configured kind.
-
-    One that plans as if it were alone answers nobody: no iteration is there to be damped, and the
-    size of the team is nothing to it.
-    """
+    """`kept_share`, but for agents that answer nobody, whatever the size of the team."""
     answers, by_size = find_kind(config.planner.kind).needs_peers, config.planner.damping < 0.0
     return 0.0 if by_size and not answers else kept_share(config)

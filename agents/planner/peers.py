@@ -1,4 +1,4 @@
-"""The one-step communication delay: which of its peers' messages an agent uses at step k.
+"""Which of its peers' messages an agent uses at step k, and what they add to its prediction.
 
 At step k each peer's plan and T_ini window of step k−1 are used (eq. 11), never those of step k,
 unless the agents answer each other within a step (`planner.exchanges`).
@@ -8,8 +8,8 @@ Pure: messages in, selection out; lost, repeated, late and foreign messages are 
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Callable, Iterable, Mapping
-from typing import Any, Final, TypeVar
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +18,22 @@ from quadriga.agents.gait import (
     horizon_stance,
     nominal_forces,
     patience,
+    phase_of,
+    place_in,
     sample_starts,
     scheduled_stance,
     step_ms,
+    walking_steps,
 )
+from quadriga.agents.planner.cooperation import (
+    brings_forward,
+    is_cooperative,
+    peer_slope,
+    team_slope,
+)
+from quadriga.agents.planner.qp import stance_columns
 from quadriga.agents.plausibility import is_plausible
+from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config
 from quadriga.shared.messages import Measurement, Plan
 from quadriga.shared.robots.conventions import N_FORCES, N_OUTPUTS, Array, robot_names
@@ -54,7 +65,7 @@ class PeerMemory:
 
 @record
 class PeerData:
-    """One peer's part of eq. 11 at planning step k; its window ends at `PeerSelection.window_step`.
+    """One peer's part of eq. 11 at a planning step.
 
     Attributes:
         robot: the peer's name.
@@ -80,16 +91,21 @@ class PeerData:
 
 
 @record
-class PeerSelection:
-    """Everything an agent takes from its peers at one planning step.
+class PeerTerms:
+    """Effect of the peers on an agent's outputs at one planning step (eq. 11).
 
     Attributes:
-        peers: each peer's part.
-        window_step: planning step at which the peers' windows end.
+        effect: Σ G_ij [u_ini; y_ini; u] over the peers, (6 N,).
+        slope: Σ M_ij [u_ini; y_ini; u] over the peers, what they add to the slope of the team's
+            cost by own stance forces, (nv,); 0 where each agent has its own cost.
+        step: planning step.
+        peers: what this is made of.
     """
 
+    effect: Array | float = 0.0
+    slope: Array | float = 0.0
+    step: int = 0
     peers: tuple[PeerData, ...] = ()
-    window_step: int = 0
 
     @property
     def used(self) -> dict[str, int]:
@@ -98,7 +114,7 @@ class PeerSelection:
 
     @property
     def lost(self) -> tuple[str, ...]:
-        """Names of the peers given up."""
+        """Names of the peers given up; the agent stops if there are any."""
         return tuple(peer.robot for peer in self.peers if peer.status == LOST)
 
 
@@ -143,21 +159,20 @@ class Neighbours:
         for the same tick or step, comes from a robot that is no peer, is off the time grid or from
         the future, is a plan of another horizon, or has implausible numbers (`is_plausible`).
         """
-        peers, refused = dict(memory.peers), memory.refused
+        peers, refused, oldest = dict(memory.peers), memory.refused, tick - self._span_ms
         arrived: list[tuple[str, Measurement | Plan]] = [*measurements, *plans]
         for robot, message in arrived:
             history = peers.get(robot)
             if history is None or not self._is_usable(message, tick):
                 refused += 1
                 continue
+            samples, made = history.measurements, history.plans
             if isinstance(message, Plan):
-                held = _insert(history.plans, message, tick - self._span_ms, _by_serial)
-                refused += held is history.plans
-                peers[robot] = PeerHistory(history.measurements, held)
+                made = _insert(made, message, oldest)
             else:
-                known = _insert(history.measurements, message, tick - self._span_ms, _by_tick)
-                refused += known is history.measurements
-                peers[robot] = PeerHistory(known, history.plans)
+                samples = _insert(samples, message, oldest)
+            refused += made is history.plans and samples is history.measurements
+            peers[robot] = PeerHistory(samples, made)
         return PeerMemory(peers, refused)
 
     def _is_usable(self, message: Measurement | Plan, now: int) -> bool:
@@ -213,7 +228,7 @@ class Neighbours:
 
     def select(
         self, memory: PeerMemory, last: int, first_step: int, *, window_step: int | None = None
-    ) -> PeerSelection:
+    ) -> tuple[PeerData, ...]:
         """Choose the plan and the window of each peer that a planning step uses.
 
         Before its first plan has arrived a peer is assumed to have planned no deviation at step
@@ -236,13 +251,11 @@ class Neighbours:
             du, step = np.zeros((planner.N, N_FORCES)), None
             if plans:
                 step = plans[-1].step
-                stance = horizon_stance(config, index, step)
-                rest = (plans[-1].u - nominal_forces(stance, config.robot.weight))[
-                    planner.applied * (end - step) :
-                ]
+                nominal = nominal_forces(horizon_stance(config, index, step), config.robot.weight)
+                rest = (plans[-1].u - nominal)[planner.applied * (end - step) :]
                 du[: len(rest)] = rest
             peers.append(PeerData(name, index, status, step, max(age, 0), *window, du))
-        return PeerSelection(tuple(peers), end)
+        return tuple(peers)
 
     def _judge(
         self, history: PeerHistory, last: int, first_step: int
@@ -305,18 +318,110 @@ def _stands(sample: Measurement) -> bool:
     return bool((sample.stance > 0.5).all())
 
 
-def _by_tick(measurement: Measurement) -> int:
-    return measurement.tick
+def _order(message: Measurement | Plan) -> tuple[int, int]:
+    """What messages of a kind are sorted by."""
+    return message.serial if isinstance(message, Plan) else (message.tick, 0)
 
 
-def _by_serial(plan: Plan) -> tuple[int, int]:
-    return plan.serial
-
-
-def _insert(held: tuple[M, ...], new: M, oldest: int, order: Callable[[M], Any]) -> tuple[M, ...]:
+def _insert(held: tuple[M, ...], new: M, oldest: int) -> tuple[M, ...]:
     """`held` with `new` sorted in, without what is older; `held` itself if it has `new` already."""
-    place: int = bisect_left(held, order(new), key=order)
-    if place < len(held) and order(held[place]) == order(new):
+    place = bisect_left(held, _order(new), key=_order)
+    if place < len(held) and _order(held[place]) == _order(new):
         return held
     kept = [item for item in held[:place] if item.tick >= oldest]
     return (*kept, new, *held[place:])
+
+
+class Peers:
+    """Fixed data of one agent's coupling to its peers; its functions depend on arguments alone.
+
+    A swinging leg of a peer carries no force: its columns of G, a third of all, are left out, which
+    is exact. Single precision changes an effect by 3e-7 of its size and halves the memory that is
+    read.
+
+    Args:
+        config: the team's configuration.
+        index: this agent's place in the team, 0-based.
+        predictor: fitted for this team.
+    """
+
+    def __init__(self, config: Config, index: int, predictor: Predictor) -> None:
+        self._config, self._index, self._predictor = config, index, predictor
+        self._others = [j for j in range(config.team.robots) if j != index]
+        # Memo of the couplings, one for each step of the gait's cycle; it changes no result.
+        self._couplings: dict[tuple[int, int], tuple[NDArray[np.int64], NDArray[np.float32]]] = {}
+        self._cycle = walking_steps(config)
+        self._cooperative = is_cooperative(config)
+        behind = {0 if brings_forward(config) else 1}
+        if config.planner.exchanges:
+            behind.add(0)
+        # The cycle's first step is set up twice: later its plans also begin at a step of the walk.
+        for step in (*self._cycle, self._cycle.stop):
+            for steps in behind:
+                self._coupling(step, step - steps)
+
+    def terms(
+        self, peers: tuple[PeerData, ...], step: int, window_step: int, y_base: Array
+    ) -> PeerTerms:
+        """The peers' terms of eq. 11 for planning step `step`.
+
+        Args:
+            peers: see `Neighbours.select`.
+            step: chooses the transition matrix.
+            window_step: planning step at which the peers' windows end.
+            y_base: base of the outputs at the ends of the windows' samples, (T_ini, 6).
+        """
+        if not peers:
+            return PeerTerms()
+        z = np.zeros((len(self._others), self._predictor.meta.width), dtype=np.float32)
+        for peer in peers:
+            if peer.status == USABLE:
+                dy = np.where(peer.known[:, None], peer.y_ini - y_base, 0.0)
+                z[peer.index - (peer.index > self._index)] = np.concatenate(
+                    [peer.du_ini.ravel(), dy.ravel(), peer.du.ravel()]
+                )
+        columns, rows = self._coupling(step, window_step)
+        total = (rows @ z.ravel()[columns]).astype(np.float64)
+        outputs = N_OUTPUTS * self._config.planner.N
+        slope = total[outputs:] if self._cooperative else 0.0
+        return PeerTerms(total[:outputs], slope, step, peers)
+
+    def _coupling(
+        self, step: int, window_step: int
+    ) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+        """Of all peers' z at a step, whose plans begin at `window_step`: places, and rows of G."""
+        place = place_in(self._cycle, step), place_in(self._cycle, window_step)
+        if place not in self._couplings:
+            stance = [horizon_stance(self._config, j, window_step) for j in self._others]
+            self._couplings[place] = couple(self._blocks(step), stance)
+        return self._couplings[place]
+
+    def _blocks(self, step: int) -> list[Array]:
+        """G_ij of each peer; with the team's cost [G_ij; M_ij]."""
+        config, index, predictor = self._config, self._index, self._predictor
+        phase = phase_of(config, step, predictor.phases)
+        blocks = [predictor.block(index, j, phase) for j in self._others]
+        if not self._cooperative:
+            return blocks
+        slopes = team_slope(config, predictor, index, step)
+        rows = [peer_slope(slopes, predictor, j, phase) for j in self._others]
+        return [np.concatenate(pair) for pair in zip(blocks, rows, strict=True)]
+
+
+def couple(
+    G: Sequence[Array] | Array, stance: Sequence[NDArray[np.bool_]]
+) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+    """Places, (c,), in all peers' z = [u_ini; y_ini; u], and the columns of G there, (rows, c).
+
+    Args:
+        G: of each peer, (rows, 18 T_ini + 12 N).
+        stance: of each peer over its plan, (N, 4).
+    """
+    columns, rows = [np.zeros(0, dtype=np.int64)], [np.zeros((len(G[0]) if len(G) else 0, 0))]
+    for i, (block, legs) in enumerate(zip(G, stance, strict=True)):
+        past = block.shape[1] - 3 * legs.size
+        kept = np.concatenate([np.arange(past), past + stance_columns(legs)])
+        columns.append(i * block.shape[1] + kept)
+        rows.append(block[:, kept])
+    G_kept = np.ascontiguousarray(np.concatenate(rows, axis=1), dtype=np.float32)
+    return np.concatenate(columns), G_kept

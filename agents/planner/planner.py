@@ -23,8 +23,7 @@ from quadriga.agents.planner.cooperation import (
     stay_near_last,
 )
 from quadriga.agents.planner.foot_limits import FAILED, ForceQp, minimise
-from quadriga.agents.planner.peer_terms import Peers, PeerTerms
-from quadriga.agents.planner.peers import PeerSelection
+from quadriga.agents.planner.peers import PeerTerms
 from quadriga.agents.planner.qp import PlannerProblem, Residuals, build_problem, unpack
 from quadriga.agents.planner.solver import (
     NOMINAL,
@@ -44,7 +43,8 @@ from quadriga.shared.runtime.jit import compiled
 from quadriga.shared.runtime.record import record
 
 IMPLAUSIBLE: Final = "implausible"
-_Planned = tuple[Array, Array, Array, Array, tuple[float, float, float], int]
+_OWN_COST: Final = np.zeros(0)  # instead of a linear term: it is computed with the plan
+_Planned = tuple[Array, Array, Array, Array, Residuals, int]
 
 
 @record
@@ -89,13 +89,11 @@ class PlannerState:
         step: its planning step; −1 before the first one.
         du: its force deviations, (N, 12), N.
         y: the outputs it predicts, (N, 6).
-        solves: QPs solved so far.
     """
 
     step: int = -1
     du: Array | None = None
     y: Array | None = None
-    solves: int = 0
 
 
 @record
@@ -135,12 +133,11 @@ class _Prediction(NamedTuple):
 
 @record
 class _Setup:
-    """Set-up of one step of the gait's cycle; no deviation of the QP's forces, (nv,), N."""
+    """Set-up of one step of the gait's cycle."""
 
     problem: PlannerProblem
     solver: DaqpSolver
     prediction: _Prediction
-    none: Array
 
 
 class Planner:
@@ -158,7 +155,7 @@ class Planner:
     def __init__(self, config: Config, index: int, predictor: Predictor) -> None:
         check_sizes(config, predictor)
         self._config, self._index, self._predictor = config, index, predictor
-        self._cycle, self._peers = walking_steps(config), Peers(config, index, predictor)
+        self._cycle = walking_steps(config)
         self._cooperative = is_cooperative(config)
         self._kept = 0.0 if self._cooperative else kept_by_agent(config)
         self._new_share = new_plan_share(config, predictor) if self._cooperative else 1.0
@@ -166,14 +163,6 @@ class Planner:
         self._setups: dict[int, _Setup] = {}
         for step in self._cycle:
             self._setup(step)
-
-    def initial(self) -> PlannerState:
-        """No plan made yet."""
-        return PlannerState()
-
-    def peer_terms(self, selection: PeerSelection, step: int, y_base: Array) -> PeerTerms:
-        """See `Peers.terms`."""
-        return self._peers.terms(selection, step, y_base)
 
     def step(
         self, state: PlannerState, inputs: PlannerInputs, peers: PeerTerms
@@ -186,15 +175,13 @@ class Planner:
             peers: the peers' terms of eq. 11.
         """
         setup = self._setup(inputs.step)
-        forces, outputs, y_free, f, proof, solutions = self._plan(setup, state, inputs, peers)
+        forces, outputs, y_free, f, residuals, solutions = self._plan(setup, state, inputs, peers)
         if solutions == FAILED:
             result = self._fall_back(setup, state, inputs, peers, y_free, f)
         else:
-            residuals = Residuals(*proof) if solutions else setup.solver.exact
-            plan = forces[0], forces[1], outputs[0], outputs[1]
-            result = PlanResult(SOLVED, *plan, residuals, solutions)
-        solves = state.solves + (not peers.lost)
-        return PlannerState(inputs.step, result.du, result.y, solves), result
+            (u, du), (y, y_nominal) = forces, outputs
+            result = PlanResult(SOLVED, u, du, y, y_nominal, residuals, solutions)
+        return PlannerState(inputs.step, result.du, result.y), result
 
     def problem_of(
         self, state: PlannerState, inputs: PlannerInputs, peers: PeerTerms
@@ -213,9 +200,8 @@ class Planner:
         self, setup: _Setup, state: PlannerState, inputs: PlannerInputs, peers: PeerTerms
     ) -> _Planned:
         """See `_plan_step`."""
-        problem, f, last, effect = setup.problem, setup.none[:0], setup.none, peers.effect
-        if self._cooperative or self._kept:
-            last = self._last(problem, state, inputs.step)
+        problem, f, effect = setup.problem, _OWN_COST, peers.effect
+        last = self._last(problem, state, inputs.step)
         # Any number may be measured; one that overflows shows in the result.
         if self._cooperative:
             with np.errstate(over="ignore", invalid="ignore"):
@@ -288,10 +274,9 @@ class Planner:
     def _setup(self, step: int) -> _Setup:
         """The set-up of a step of the gait's cycle, from the memo."""
         place = place_in(self._cycle, step)
-        setup = self._setups.get(place)
-        if setup is None:
-            setup = self._setups[place] = self._build_setup(place)
-        return setup
+        if place not in self._setups:
+            self._setups[place] = self._build_setup(place)
+        return self._setups[place]
 
     def _build_setup(self, step: int) -> _Setup:
         config, index, past = self._config, self._index, self._predictor.meta.past
@@ -306,7 +291,7 @@ class Planner:
         condensed, nominal = problem.condensed, nominal_forces(stance, weight)
         matrices = condensed.Y_past, condensed.Y_v, condensed.F_des
         prediction = _Prediction(*matrices, problem.columns, nominal, nominal_table(weight))
-        return _Setup(problem, solver, prediction, np.zeros(len(problem.columns)))
+        return _Setup(problem, solver, prediction)
 
 
 @compiled
@@ -334,7 +319,7 @@ def _plan_step(
 
     Returns:
         u and du, (2, N, 12), y and y_nominal, (2, N, 6), see `PlanResult`; the free response y_free
-        of eq. 11, (6 N,); f; residuals and number of solutions of the QP's `Minimum`.
+        of eq. 11, (6 N,); f; residuals and number of solutions, see `Minimum`.
     """
     # Unpacked before the loops: each access to a tuple in a loop costs a reference count.
     u_ini, y_ini, stance_ini, y_base_ini, y_base, y_des = own
@@ -351,11 +336,9 @@ def _plan_step(
     y_free = Y_past @ past + effect
     if not len(f):
         f = F_des @ ((y_des - y_base).ravel() - y_free)
-    x, proof, solutions = x_last, (0.0, 0.0, 0.0), FAILED
+    x, residuals, solutions = x_last, Residuals(0.0, 0.0, 0.0), FAILED
     if limits_feet:
-        found = minimise(qp, f)
-        x, solutions = found.v, found.solutions
-        proof = found.stationarity, found.primal, found.complementarity
+        x, _, residuals, solutions = minimise(qp, f)
     if kept:
         x = (1.0 - kept) * x + kept * x_last
     forces, outputs = np.zeros((2, N, N_FORCES)), np.empty((2, N, N_OUTPUTS))
@@ -368,4 +351,4 @@ def _plan_step(
     for output in outputs.flat:
         if not abs(output) <= OUTPUT_MAX:
             solutions = FAILED
-    return forces, outputs, y_free, f, proof, solutions
+    return forces, outputs, y_free, f, residuals, solutions

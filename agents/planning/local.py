@@ -8,8 +8,7 @@ from typing import Final
 
 from quadriga.agents.gait import exchange_ms, first_due_step, first_step, patience, step_ms
 from quadriga.agents.planner.cooperation import brings_forward, coupled_peers
-from quadriga.agents.planner.peer_terms import PeerTerms
-from quadriga.agents.planner.peers import Neighbours, PeerMemory
+from quadriga.agents.planner.peers import Neighbours, PeerMemory, Peers, PeerTerms
 from quadriga.agents.planner.planner import Planner, PlannerInputs, PlannerState
 from quadriga.agents.planner.solver import SOLVED, SolvedQp
 from quadriga.agents.planning.active_plan import FADED, ActivePlan, trust_scaling
@@ -25,7 +24,7 @@ from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.codes import with_detail
 from quadriga.shared.config.sections import Config
 from quadriga.shared.messages import Measurement, Plan
-from quadriga.shared.modes import PEER_LOST, WALK, WINDOW_LOST, Mode
+from quadriga.shared.modes import PEER_LOST, WALK, WINDOW_LOST
 from quadriga.shared.runtime.record import record
 from quadriga.shared.topics import SAMPLE_MS
 
@@ -39,7 +38,7 @@ class LocalState:
     Attributes:
         peers: the peers' messages.
         own: the agent's last samples, T_ini of them.
-        terms: what the peers will do, for the planning step `terms.steps[0]`.
+        terms: what the peers will do, for the planning step `terms.step`.
         inputs: what the plan of the present step was made of.
         planner: what the planner remembers.
     """
@@ -51,13 +50,9 @@ class LocalState:
     planner: PlannerState = field(default_factory=PlannerState)
 
 
-@record
-class _Request:
-    """What the planner is asked at a tick: a new plan (exchange 0) or an answer to the peers'."""
-
-    serial: tuple[int, int]
-    inputs: PlannerInputs
-    terms: PeerTerms
+# What the planner is asked at a tick: step and exchange of a new plan (exchange 0) or of an answer
+# to the peers', the robot's own data, what its peers will do.
+_Request = tuple[tuple[int, int], PlannerInputs, PeerTerms]
 
 
 class LocalPlanning:
@@ -78,6 +73,7 @@ class LocalPlanning:
         self._first_step = first_step(config)
         self._neighbours = Neighbours(config, index, coupled_peers(config, index, predictor))
         self._planner = Planner(config, index, predictor)
+        self._coupling = Peers(config, index, predictor)
 
     @property
     def peers(self) -> tuple[str, ...]:
@@ -114,7 +110,7 @@ class LocalPlanning:
         state, request, _ = self._update(state, inputs)
         if request is None:
             return None
-        return self._planner.problem_of(state.planner, request.inputs, request.terms)
+        return self._planner.problem_of(state.planner, *request[1:])
 
     def is_whole(self, state: LocalState, tick: int) -> bool:
         """Whether its own window is whole, and its peers are heard and do not slow down."""
@@ -143,65 +139,55 @@ class LocalPlanning:
             state = replace(state, own=own)
         if inputs.mode.name != WALK:
             return state, None, unusual
-        return self._request(state, inputs, unusual)
-
-    def _request(
-        self, state: LocalState, inputs: PlanningInputs, unusual: tuple[str, ...]
-    ) -> tuple[LocalState, _Request | None, tuple[str, ...]]:
-        """What is due at a tick of walking: a plan, an answer, or the terms of the next plan."""
         step, exchange, off = self._place(inputs.tick)
-        exchanges, references = self._config.planner.exchanges, inputs.references
+        exchanges = self._config.planner.exchanges
         if off == exchange == 0 and step >= self._first_step:
             if is_gapless(state.own, self._config.planner.T_ini, inputs.tick):
                 terms = self._next_terms(state, step, inputs)
-                own = build_planner_inputs(self._config, step, inputs.tick, state.own, references)
-                state = replace(state, terms=terms, inputs=own)
-                return state, _Request((step, 0), own, terms), unusual
+                now = build_planner_inputs(
+                    self._config, step, inputs.tick, state.own, inputs.references
+                )
+                state = replace(state, terms=terms, inputs=now)
+                return state, ((step, 0), now, terms), unusual
             unusual = (WINDOW_GAP, *unusual)
-        if off == 0 and 1 <= exchange <= exchanges:
-            return state, self._answer(state, (step, exchange), inputs), unusual
-        if (inputs.plans or inputs.measurements) and self._has_all(state, (step, exchanges)):
+        complete = self._neighbours.is_complete
+        if off == 0 and 1 <= exchange <= exchanges:  # skipped if some of the peers' are late
+            past = state.inputs
+            if past is None or past.step != step or not complete(state.peers, (step, exchange - 1)):
+                return state, None, unusual
+            terms = self._terms(state, step, inputs, last=step, end=step)
+            return state, ((step, exchange), past, terms), unusual
+        if (inputs.plans or inputs.measurements) and complete(state.peers, (step, exchanges)):
             # All that the coming step needs of the peers is there: off the critical path.
             state = replace(state, terms=self._next_terms(state, step + 1, inputs))
         return state, None, unusual
 
     def _next_terms(self, state: LocalState, step: int, inputs: PlanningInputs) -> PeerTerms:
         """The peers' terms of a planning step, made of what they sent up to the step before."""
-        if state.terms.steps[0] == step:
+        if state.terms.step == step:
             return state.terms
-        first, end = self._first(inputs.mode), step if brings_forward(self._config) else step - 1
-        selection = self._neighbours.select(state.peers, step - 1, first, window_step=end)
-        # The base of samples to come is the command of now, whenever this is computed.
-        now = (step - 1) * self._step_ms
+        end = step if brings_forward(self._config) else step - 1
+        return self._terms(state, step, inputs, last=step - 1, end=end)
+
+    def _terms(
+        self, state: LocalState, step: int, inputs: PlanningInputs, *, last: int, end: int
+    ) -> PeerTerms:
+        """Of what peers sent up to the step `last`, with windows that end at the step `end`."""
+        first = max(self._first_step, -(-inputs.mode.since // self._step_ms))
+        peers = self._neighbours.select(state.peers, last, first, window_step=end)
+        # The base of samples to come is the command of `last`, whenever this is computed.
+        now = last * self._step_ms
         base = base_of_window(self._config, end * self._step_ms, inputs.references, now)
-        return self._planner.peer_terms(selection, step, base)
-
-    def _answer(
-        self, state: LocalState, serial: tuple[int, int], inputs: PlanningInputs
-    ) -> _Request | None:
-        """Plan the present step again with the peers' plans of it; skipped if some are late."""
-        (step, exchange), own = serial, state.inputs
-        if own is None or own.step != step or not self._has_all(state, (step, exchange - 1)):
-            return None
-        selection = self._neighbours.select(state.peers, step, self._first(inputs.mode))
-        base = base_of_window(self._config, step * self._step_ms, inputs.references)
-        return _Request(serial, own, self._planner.peer_terms(selection, step, base))
-
-    def _first(self, mode: Mode) -> int:
-        """The first planning step: the team's, or that of a robot which began to walk later."""
-        return max(self._first_step, -(-mode.since // self._step_ms))
-
-    def _has_all(self, state: LocalState, serial: tuple[int, int]) -> bool:
-        return self._neighbours.is_complete(state.peers, serial)
+        return self._coupling.terms(peers, step, end, base)
 
     def _plan(
         self, state: LocalState, request: _Request, tick: int, unusual: tuple[str, ...]
     ) -> tuple[LocalState, PlanningOutputs]:
         """Solve what is asked; what is applied, followed and published of it depends on trust."""
-        own, terms, (step, exchange) = request.inputs, request.terms, request.serial
+        (step, exchange), own, terms = request
         begun = self._clock_ns()
         planner, result = self._planner.step(state.planner, own, terms)
-        took = self._clock_ns() - begun if planner.solves > state.planner.solves else None
+        took = None if terms.lost else self._clock_ns() - begun
         share = trust_scaling(self._config.planner, own.y_ini[-1] - own.y_des[0])
         faded = result.status == SOLVED and share < 1.0
         # Outputs under nominal forces alone are not followed: nobody wants the robot to do that.
@@ -226,7 +212,7 @@ class LocalPlanning:
             ActivePlan(start, plan_tick, share * result.du, followed),
             _peer_lost(terms.lost) if terms.lost else "",
             took,
-            {f"plan.{p}": float(self._step_ms * (behind + age)) for p, age in terms.ages.items()},
+            {f"plan.{p.robot}": float(self._step_ms * (behind + p.age)) for p in terms.peers},
             unusual,
         )
         return replace(state, planner=planner), outputs

@@ -42,20 +42,17 @@ def reference_at(
     return Reference(0, 0, 0.0, 0.0, 0.0, height), tick
 
 
-def base_of_window(
-    config: Config, end: int, references: tuple[Reference, ...], now: int | None = None
-) -> Array:
+def base_of_window(config: Config, end: int, references: tuple[Reference, ...], now: int) -> Array:
     """Base of the outputs at the ends of the T_ini samples up to the tick `end`. (T_ini, 6).
 
     For samples after the tick `now` it is that of `now`.
     """
-    height = config.reference.height
-    ticks = range(end - SAMPLE_MS * (config.planner.T_ini - 1), end + 1, SAMPLE_MS)
-    known = [tick if now is None else min(tick, now) for tick in ticks]
-    first, last = (reference_at(references, tick, height)[0] for tick in (known[0], known[-1]))
+    height, begin = config.reference.height, end - SAMPLE_MS * (config.planner.T_ini - 1)
+    ticks = [min(tick, now) for tick in range(begin, end + 1, SAMPLE_MS)]
+    first, last = (reference_at(references, tick, height)[0] for tick in (ticks[0], ticks[-1]))
     if first is last:  # as nearly always
-        return np.tile(output_base(config, last), (len(known), 1))
-    return np.array([output_base(config, reference_at(references, t, height)[0]) for t in known])
+        return np.tile(output_base(config, last), (len(ticks), 1))
+    return np.array([output_base(config, reference_at(references, t, height)[0]) for t in ticks])
 
 
 def is_gapless(samples: tuple[Measurement, ...], count: int, end: int) -> bool:
@@ -86,7 +83,7 @@ def build_planner_inputs(
         u_ini=np.array([sample.u for sample in window]),
         y_ini=np.array([sample.y for sample in window]),
         stance_ini=np.array([sample.stance for sample in window]) > 0.5,
-        y_base_ini=base_of_window(config, end, references),
+        y_base_ini=base_of_window(config, end, references, end),
         y_base=np.repeat(output_base(config, now)[None], planner.N, axis=0),
         y_des=np.repeat(commanded_outputs(now)[None], planner.N, axis=0),
         weight=config.robot.weight,

@@ -145,7 +145,7 @@ class PredictorMeta:
         return self.layout.past
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Predictor:
     """y^i = Σ_j G_ij [u_ini^j; y_ini^j; u^j] in deviations and physical units (eq. 10).
 

@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from quadriga.agents.planner.peer_terms import PeerTerms
-from quadriga.agents.planner.peers import PeerData, PeerSelection
-from quadriga.agents.planner.planner import Planner, PlannerInputs, PlanResult
+from quadriga.agents.planner.peers import PeerData, Peers, PeerTerms
+from quadriga.agents.planner.planner import Planner, PlannerInputs, PlannerState, PlanResult
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robots.conventions import Array
@@ -56,11 +55,11 @@ def inputs_of(config: Config, step: int = STEP, **changes: Any) -> PlannerInputs
 
 
 def terms_of(
-    config: Config, planner: Planner, *peers: PeerData, base: Array | None = None
+    config: Config, predictor: Predictor, *peers: PeerData, base: Array | None = None
 ) -> PeerTerms:
     """Terms of the peers given, by default of one that did and plans nothing."""
     y_base = np.tile(BASE, (config.planner.T_ini, 1)) if base is None else base
-    return planner.peer_terms(PeerSelection(peers or (peer(config),)), STEP, y_base)
+    return Peers(config, 0, predictor).terms(peers or (peer(config),), STEP, 0, y_base)
 
 
 def plan(
@@ -71,8 +70,8 @@ def plan(
     base: Array | None = None,
 ) -> PlanResult:
     planner = Planner(config, 0, predictor)
-    terms = terms_of(config, planner, *peers, base=base)
-    return planner.step(planner.initial(), inputs, terms)[1]
+    terms = terms_of(config, predictor, *peers, base=base)
+    return planner.step(PlannerState(), inputs, terms)[1]
 
 
 def team_cost(

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import linalg
 
-from quadriga.agents.gait import horizon_stance, walking_steps
+from quadriga.agents.gait import horizon_stance
 from quadriga.agents.planner.cooperation import (
     cooperative_radius,
     coupled_peers,
@@ -21,10 +21,9 @@ from quadriga.agents.planner.cooperation import (
     kept_by_agent,
     kept_share,
     new_plan_share,
-    team_hessian,
 )
-from quadriga.agents.planner.peers import PeerData, PeerSelection
-from quadriga.agents.planner.planner import Planner
+from quadriga.agents.planner.peers import PeerData, Peers
+from quadriga.agents.planner.planner import Planner, PlannerState
 from quadriga.agents.planner.team import build_centralised
 from quadriga.agents.predictor.gates import are_same_costs, iteration_radius, probe_costs, run_gates
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
@@ -82,7 +81,8 @@ class Round:
             for _ in range(config.team.robots)
         ]
         self.planners = [Planner(config, i, predictor) for i in range(config.team.robots)]
-        self.states = [planner.initial() for planner in self.planners]
+        self.coupling = [Peers(config, i, predictor) for i in range(config.team.robots)]
+        self.states = [PlannerState() for planner in self.planners]
         self.du = np.zeros((config.team.robots, planner.N, 12))
 
     def plan(self) -> None:
@@ -91,7 +91,7 @@ class Round:
         for i, planner in enumerate(self.planners):
             peers = tuple(self._data(j) for j in range(len(self.planners)) if j != i)
             base = self.inputs[i].y_base_ini
-            terms = planner.peer_terms(PeerSelection(peers, STEP), STEP, base)
+            terms = self.coupling[i].terms(peers, STEP, STEP, base)
             self.states[i], result = planner.step(self.states[i], self.inputs[i], terms)
             assert result.status == "solved"
             new.append(result.du)
@@ -204,7 +204,7 @@ def test_the_slope_is_that_of_the_team_s_cost(small: Config, linear_team: Team) 
     at, planner = rounds.du, rounds.planners[1]
     peers = tuple(rounds._data(j) for j in (0, 2))
     base = rounds.inputs[1].y_base_ini
-    terms = planner.peer_terms(PeerSelection(peers, STEP), STEP, base)
+    terms = rounds.coupling[1].terms(peers, STEP, STEP, base)
     qp = planner.problem_of(rounds.states[1], rounds.inputs[1], terms)
     assert qp is not None
     w = new_plan_share(config, rounds.predictor)
@@ -223,8 +223,8 @@ def test_the_innovation_is_answered_in_full_and_all_else_in_part(small: Config) 
     planner, w = Planner(config, 0, predictor), new_plan_share(config, predictor)
     assert w < 0.9
     before, applied, T_ini = inputs_of(config, STEP), small.planner.applied, small.planner.T_ini
-    terms = terms_of(config, planner, peer(config), peer(config, robot="r3", index=2))
-    state, first = planner.step(planner.initial(), before, terms)
+    terms = terms_of(config, predictor, peer(config), peer(config, robot="r3", index=2))
+    state, first = planner.step(PlannerState(), before, terms)
     stance = horizon_stance(config, 0, STEP)[:applied]
     expected = inputs_of(
         config,
@@ -255,22 +255,6 @@ def test_the_share_is_the_one_that_contracts_fastest(small: Config) -> None:
     assert 0.0 < last < 2 / 3
     for other in (0.8 * last, 1.2 * last, 2 / 3):
         assert cooperative_radius(cooperative(small, damping=other), predictor) > automatic
-    H, sizes = team_hessian(config, predictor, walking_steps(config)[0])
-    ends = np.cumsum(sizes)
-    D = linalg.block_diag(*[H[e - s : e, e - s : e] for e, s in zip(ends, sizes, strict=True)])
-    one_step = np.eye(len(H)) - (1.0 - last) * linalg.solve(D, H)
-    assert np.abs(linalg.eigvals(one_step)).max() <= automatic + 1e-6
-
-
-def test_without_coupling_the_plan_is_the_agent_s_own(small: Config) -> None:
-    config = cooperative(small)
-    predictor = coupled(config, 2, 0.0)
-    assert new_plan_share(config, predictor) == pytest.approx(1.0)
-    selfish = replace(config, planner=replace(config.planner, cost="own"))
-    mine, theirs = Round(config, predictor, 1, 1.0), Round(selfish, predictor, 1, 1.0)
-    mine.plan()
-    theirs.plan()
-    np.testing.assert_allclose(mine.du, theirs.du, atol=1e-6)
 
 
 def test_too_little_of_the_last_plan_is_refused(small: Config, linear_team: Team) -> None:
@@ -335,11 +319,11 @@ def test_the_peers_terms_are_the_effect_of_their_plans_and_its_slope(
     stance = np.repeat(horizon_stance(config, 1, STEP), 3, axis=1)
     pushing = np.where(stance, np.tile([20.0, 5.0, 0.0], (8, 4)), 0.0)
     pair = peer(config, age=1, du=pushing), peer(config, robot="r3", index=2)
-    terms = planner.peer_terms(PeerSelection(pair, STEP), STEP, base)
+    terms = Peers(config, 0, predictor).terms(pair, STEP, STEP, base)
     z = np.zeros((3, predictor.meta.width))
     z[1, predictor.meta.past :] = pushing.ravel()
     effect = predictor.predict(z)
-    qp = planner.problem_of(planner.initial(), inputs_of(config), terms)
+    qp = planner.problem_of(PlannerState(), inputs_of(config), terms)
     assert qp is not None
     columns, Q = qp.problem.columns, np.tile(config.planner.Q, config.planner.N)
     blocks = [predictor.future_block(j, 0)[:, columns] for j in range(3)]

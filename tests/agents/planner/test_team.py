@@ -8,22 +8,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy import optimize
 
 from quadriga.agents.gait import horizon_stance
-from quadriga.agents.planner.peer_terms import PeerTerms
-from quadriga.agents.planner.planner import Planner, PlannerInputs
+from quadriga.agents.planner.peers import PeerTerms
+from quadriga.agents.planner.planner import Planner, PlannerInputs, PlannerState
 from quadriga.agents.planner.team import build_centralised
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.shared.config.sections import Config
-from quadriga.shared.errors import PredictorError
-from quadriga.shared.robots.conventions import Array
-from tests.a1 import WEIGHT, nominal_forces
-from tests.agents.calm import team_cost
+from tests.a1 import nominal_forces
+from tests.agents.calm import BASE, STEP, inputs_of, team_cost
 from tests.agents.conftest import fit_ridge
-
-BASE = np.array([0.26, 0.4, 0.0, 0.0, 0.0, 0.1])
-STEP = 20
 
 
 @pytest.fixture(scope="module")
@@ -34,19 +28,15 @@ def predictor(small: Config, linear_team: Callable[..., Any]) -> Predictor:
 
 def disturbed(config: Config, seed: int, size: float = 1.0) -> list[PlannerInputs]:
     """Both robots off their course in ways of their own."""
-    rng, planner = np.random.default_rng(seed), config.planner
-    stance = np.ones((planner.T_ini, 4), dtype=np.bool_)
+    rng, T_ini, N = np.random.default_rng(seed), config.planner.T_ini, config.planner.N
+    stance = np.ones((T_ini, 4), dtype=np.bool_)
     scale = size * np.array([0.004, 0.1, 0.1, 0.02, 0.02, 0.1])
     return [
-        PlannerInputs(
-            step=STEP,
-            u_ini=nominal_forces(stance) + 5.0 * size * rng.normal(size=(planner.T_ini, 12)),
-            y_ini=BASE + scale * rng.normal(size=(planner.T_ini, 6)),
-            stance_ini=stance,
-            y_base_ini=np.tile(BASE, (planner.T_ini, 1)),
-            y_base=np.tile(BASE, (planner.N, 1)),
-            y_des=np.tile(BASE + 0.2 * scale * rng.normal(size=6), (planner.N, 1)),
-            weight=WEIGHT,
+        inputs_of(
+            config,
+            u_ini=nominal_forces(stance) + 5.0 * size * rng.normal(size=(T_ini, 12)),
+            y_ini=BASE + scale * rng.normal(size=(T_ini, 6)),
+            y_des=np.tile(BASE + 0.2 * scale * rng.normal(size=6), (N, 1)),
         )
         for _ in range(config.team.robots)
     ]
@@ -77,33 +67,6 @@ def test_no_feasible_change_of_the_forces_is_better(
     assert tried > 10 or size > 2.0
 
 
-def test_without_active_limits_it_is_the_least_squares_solution(
-    small: Config, predictor: Predictor
-) -> None:
-    inputs = disturbed(small, 3, 0.05)
-    result = build_centralised(small, predictor).step(inputs)
-    stance = np.stack([horizon_stance(small, i, STEP) for i in range(2)])
-    columns = np.flatnonzero(np.repeat(stance, 3, axis=2))
-    du = np.zeros(stance.shape[0] * stance.shape[1] * 12)
-
-    def residual(v: Array) -> Array:
-        forces = du.copy()
-        forces[columns] = v
-        forces = forces.reshape(2, -1, 12)
-        z = np.stack(
-            [np.concatenate([r.past(), f.ravel()]) for r, f in zip(inputs, forces, strict=True)]
-        )
-        y = predictor.predict(z).reshape(2, -1, 6)
-        error = np.stack([r.y_base - r.y_des for r in inputs]) + y
-        weighted = forces.reshape(-1, 4, 3) * np.sqrt(small.planner.R)
-        return np.concatenate([(error * np.sqrt(small.planner.Q)).ravel(), weighted.ravel()])
-
-    found = optimize.least_squares(residual, np.zeros(len(columns)), method="trf", xtol=1e-15)
-    np.testing.assert_allclose(
-        (result.u - nominal_forces(stance)).ravel()[columns], found.x, atol=1e-6
-    )
-
-
 def test_robots_that_do_not_influence_each_other_plan_as_if_alone(
     small: Config, predictor: Predictor
 ) -> None:
@@ -114,7 +77,7 @@ def test_robots_that_do_not_influence_each_other_plan_as_if_alone(
     together = build_centralised(small, uncoupled).step(inputs)
     for i, own in enumerate(inputs):
         planner = Planner(small, i, uncoupled)
-        alone = planner.step(planner.initial(), own, PeerTerms())[1]
+        alone = planner.step(PlannerState(), own, PeerTerms())[1]
         np.testing.assert_allclose(together.u[i], alone.u, atol=1e-6)
         np.testing.assert_allclose(together.y[i], alone.y, atol=1e-6)
 
@@ -136,8 +99,3 @@ def test_the_plan_is_what_the_team_will_do(
     du = (result.u - nominal_forces(planned)).transpose(1, 0, 2)
     happened = BASE + team.respond(np.concatenate([past, du]))[40:]
     np.testing.assert_allclose(result.y, happened.transpose(1, 0, 2), atol=1e-6)
-
-
-def test_a_predictor_of_another_team_is_refused(small: Config, predictor: Predictor) -> None:
-    with pytest.raises(PredictorError, match=r"got \(robots, N, T_ini\)"):
-        build_centralised(replace(small, team=replace(small.team, robots=3)), predictor)
