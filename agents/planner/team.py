@@ -28,20 +28,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from quadriga.agents.gait import horizon_stance, nominal_forces, phase_of, walking_steps
+from quadriga.agents.gait import horizon_stance, nominal_forces, phase_of, place_in, walking_steps
 from quadriga.agents.planner.planner import PlannerInputs
 from quadriga.agents.planner.qp import (
     NO_BOUNDS,
     Condensed,
     PlannerProblem,
-    Residuals,
     condense,
     constrain,
     stance_columns,
     unpack,
 )
 from quadriga.agents.planner.solver import NOMINAL, SOLVED, SOLVERS, DaqpSolver
-from quadriga.agents.predictor.episode import Episode, Layout, team_layout
+from quadriga.agents.predictor.episode import Episode, team_layout
 from quadriga.agents.predictor.predictor import Predictor, check_sizes
 from quadriga.agents.predictor.regression import Reduction, reduce
 from quadriga.shared.codes import with_detail
@@ -61,13 +60,11 @@ class TeamResult:
         status: "solved", or "nominal:<reason>".
         u: forces, swing legs exactly zero, (n, N, 12), N.
         y: predicted outputs, (n, N, 6).
-        residuals: optimality of the QP's solution.
     """
 
     status: str
     u: Array
     y: Array
-    residuals: Residuals
 
 
 class TeamPlanner:
@@ -81,10 +78,11 @@ class TeamPlanner:
 
     def __init__(self, config: Config, formulation: Formulation, phases: int = 1) -> None:
         self._config, self._formulation, self._phases = config, formulation, phases
-        # One factorised problem per phase and stance pattern: a memo, it changes no result.
-        self._problems: dict[tuple[int, bytes], tuple[PlannerProblem, DaqpSolver]] = {}
-        for step in walking_steps(config):
-            self._problem(step, self._stance(step))
+        self._cycle = walking_steps(config)
+        # Memo of the problems, one for each step of the gait's cycle; it changes no result.
+        self._setups: dict[int, tuple[PlannerProblem, DaqpSolver, Array]] = {}
+        for step in self._cycle:
+            self._setup(step)
 
     def step(self, inputs: Sequence[PlannerInputs]) -> TeamResult:
         """Plan the horizon of one planning step for all robots.
@@ -93,8 +91,7 @@ class TeamPlanner:
             inputs: of all robots in their order, of one step.
         """
         n, N = len(inputs), self._config.planner.N
-        stance = self._stance(inputs[0].step)
-        problem, solver = self._problem(inputs[0].step, stance)
+        problem, solver, nominal = self._setup(inputs[0].step)
         past = np.concatenate([robot.past() for robot in inputs])
         base = np.concatenate([robot.y_base for robot in inputs])
         y_des = np.concatenate([robot.y_des for robot in inputs]).ravel() - base.ravel()
@@ -103,24 +100,21 @@ class TeamPlanner:
         du, dy = unpack(problem, solution.x, y_free)
         return TeamResult(
             SOLVED if solution.status == SOLVED else with_detail(NOMINAL, solution.status),
-            (nominal_forces(stance, self._config.robot.weight) + du).reshape(n, N, -1),
+            (nominal + du).reshape(n, N, -1),
             (base + dy).reshape(n, N, -1),
-            solution.residuals,
         )
 
-    def _stance(self, step: int) -> NDArray[np.bool_]:
-        robots = range(self._config.team.robots)
-        return np.concatenate([horizon_stance(self._config, i, step) for i in robots])
-
-    def _problem(self, step: int, stance: NDArray[np.bool_]) -> tuple[PlannerProblem, DaqpSolver]:
-        key = phase_of(self._config, step, self._phases), stance.tobytes()
-        entry = self._problems.get(key)
-        if entry is None:
-            condensed = self._formulation(key[0], stance)
-            problem = constrain(self._config.planner, self._config.robot.weight, condensed, stance)
-            entry = problem, SOLVERS[self._config.planner.solver](problem)
-            self._problems[key] = entry
-        return entry
+    def _setup(self, step: int) -> tuple[PlannerProblem, DaqpSolver, Array]:
+        """The problem of a step, its solver, and the nominal forces of its horizon."""
+        place, config, weight = place_in(self._cycle, step), self._config, self._config.robot.weight
+        if place not in self._setups:
+            robots = range(config.team.robots)
+            stance = np.concatenate([horizon_stance(config, i, place) for i in robots])
+            condensed = self._formulation(phase_of(config, place, self._phases), stance)
+            problem = constrain(config.planner, weight, condensed, stance)
+            solver = SOLVERS[config.planner.solver](problem)
+            self._setups[place] = problem, solver, nominal_forces(stance, weight)
+        return self._setups[place]
 
 
 def build_centralised(
@@ -136,9 +130,11 @@ def build_centralised(
 
     def formulation(phase: int, stance: NDArray[np.bool_]) -> Condensed:
         robots = range(config.team.robots)
-        columns = [np.concatenate([predictor.block(i, j, phase) for i in robots]) for j in robots]
-        G_past = np.concatenate([column[:, :past] for column in columns], axis=1)
-        G_u = np.concatenate([column[:, past:] for column in columns], axis=1)
+        blocks = [[predictor.block(i, j, phase) for j in robots] for i in robots]
+        G_past, G_u = (
+            np.block([[block[:, part] for block in row] for row in blocks])
+            for part in (slice(past), slice(past, None))
+        )
         return condense(config.planner, G_past, G_u, stance)
 
     return TeamPlanner(config, formulation, predictor.phases)
@@ -164,65 +160,43 @@ def build_deepc(config: Config, _predictor: Predictor | None, collected: Collect
 
 
 def build_model(reduction: Reduction, config: PlannerConfig) -> Condensed:
-    """The problem of eq. 5 in all 12 n N forces of the team; `select` keeps those of stance legs.
+    """The problem of eq. 5 in all 12 n N forces of the team, with g, σ and y eliminated.
 
-    Args:
-        reduction: of the team's data.
-        config: weights.
-    """
-    Q, R = np.array(config.Q), np.tile(config.R, N_LEGS)
-    return eliminate(reduction, Q, R, config.lambda_g, config.lambda_sigma)
-
-
-def eliminate(
-    reduction: Reduction, Q: Array, R: Array, lambda_g: float, lambda_sigma: Array | float
-) -> Condensed:
-    """Eliminate g, σ and y of eq. 5.
-
-    Past and y are stacked agent by agent; rows and columns of each agent are ordered as in a
+    Past and y are stacked robot by robot; rows and columns of each robot are ordered as in a
     `Predictor`. The predicted y is drawn towards y_des, because eq. 5 lets g choose among the
-    trajectories that the data allow.
-
-    Args:
-        reduction: of the data.
-        Q: weights of the outputs of one sample of one agent, physical, positive, shape (p,).
-        R: of its inputs, likewise, shape (m,).
-        lambda_g: λ_g, positive.
-        lambda_sigma: λ_σ, of scaled outputs, positive, or one for each output, shape (p,).
-
-    Returns:
-        The problem in all m n N future inputs.
+    trajectories that the data allow. `select` keeps the forces of stance legs.
     """
-    layout, M = reduction.layout, reduction.spread
+    layout, M, response = reduction.layout, reduction.spread, reduction.response
     n, T_ini, N = layout.agents, layout.T_ini, layout.N
-    m_p, p_p = n * layout.inputs * T_ini, n * layout.outputs * T_ini
-    y_scale = np.tile(layout.y_scale, n * N)
-    root = np.sqrt(
-        np.concatenate(
-            [
-                np.tile(lambda_sigma * np.ones(layout.outputs), n * T_ini),
-                np.tile(Q, n * N) * y_scale**2,
-            ]
-        )
-    )
+    m_p, p_p, p_f = n * layout.inputs * T_ini, n * layout.outputs * T_ini, n * layout.rows
+    # Places of all robots' u_ini and of their y_ini in past.
+    places = np.arange(n * layout.past).reshape(n, -1)
+    past_u, past_y = (part.ravel() for part in np.split(places, [layout.inputs * T_ini], axis=1))
+    u_scale, y_scale = np.tile(layout.u_scale, n * (T_ini + N)), np.tile(layout.y_scale, n * N)
+    Omega = [np.full(p_p, config.lambda_sigma), np.tile(config.Q, n * N) * y_scale**2]
+    root = np.sqrt(np.concatenate(Omega))
 
     # z = C⁻ᵀ Z √Ω t and Λ = √Ω (I − Zᵀ Z) √Ω with C Cᵀ = λ_g I + Mᵀ Ω M and Z = C⁻¹ Mᵀ √Ω.
     weighted = root[:, None] * M
-    C = linalg.cholesky(lambda_g * np.eye(M.shape[1]) + weighted.T @ weighted, lower=True)
+    C = linalg.cholesky(config.lambda_g * np.eye(M.shape[1]) + weighted.T @ weighted, lower=True)
     Z = linalg.solve_triangular(C, weighted.T, lower=True)
     chosen = linalg.solve_triangular(C, M[p_p:].T, lower=True).T @ Z * root  # [0 I] M z = chosen t
     Lambda = root[:, None] * (np.eye(len(root)) - Z.T @ Z) * root
 
-    T_past, T_des, B = _residual(reduction)
-    u_all = np.tile(layout.u_scale, n * (T_ini + N))
-    effort = lambda_g / np.outer(u_all[m_p:], u_all) * reduction.inverse[m_p:]
+    # Scaled t = T_past @ past + T_des @ y_des − B u, of physical past, y_des and u.
+    T_past, T_des = np.zeros((p_p + p_f, m_p + p_p)), np.zeros((p_p + p_f, p_f))
+    T_past[:, past_u] = -response[:, :m_p] / u_scale[:m_p]
+    T_past[np.arange(p_p), past_y] = 1.0 / np.tile(layout.y_scale, n * T_ini)
+    T_des[p_p:] = np.diag(1.0 / y_scale)
+    B = response[:, m_p:] / u_scale[m_p:]
+
+    effort = config.lambda_g / np.outer(u_scale[m_p:], u_scale) * reduction.inverse[m_p:]
     gradient = B.T @ Lambda
     H = gradient @ B + effort[:, m_p:]
-    H.flat[:: len(H) + 1] += np.tile(R, n * N)
-    past_u, _ = _past_columns(layout)
+    H.flat[:: len(H) + 1] += np.tile(config.R, N_LEGS * n * N)
     F_past, Y_past = -gradient @ T_past, chosen @ T_past
     F_past[:, past_u] += effort[:, :m_p]
-    Y_past[:, past_u] += reduction.response[p_p:, :m_p] / u_all[:m_p]
+    Y_past[:, past_u] += response[p_p:, :m_p] / u_scale[:m_p]
     return Condensed(
         H=0.5 * (H + H.T),
         F_past=F_past,
@@ -243,23 +217,3 @@ def select(model: Condensed, columns: NDArray[np.int64]) -> Condensed:
         Y_past=model.Y_past,
         Y_des=model.Y_des,
     )
-
-
-def _residual(reduction: Reduction) -> tuple[Array, Array, Array]:
-    """T = T_past @ past + T_des @ y_des − B u: scaled t, physical past, y_des and u."""
-    layout, response = reduction.layout, reduction.response
-    n, T_ini, N = layout.agents, layout.T_ini, layout.N
-    m_p, p_p, p_f = n * layout.inputs * T_ini, n * layout.outputs * T_ini, n * layout.rows
-    past_u, past_y = _past_columns(layout)
-    T_past, T_des = np.zeros((p_p + p_f, m_p + p_p)), np.zeros((p_p + p_f, p_f))
-    T_past[:, past_u] = -response[:, :m_p] / np.tile(layout.u_scale, n * T_ini)
-    T_past[np.arange(p_p), past_y] = 1.0 / np.tile(layout.y_scale, n * T_ini)
-    T_des[p_p:] = np.diag(1.0 / np.tile(layout.y_scale, n * N))
-    return T_past, T_des, response[:, m_p:] / np.tile(layout.u_scale, n * N)
-
-
-def _past_columns(layout: Layout) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Places of all agents' u_ini and of their y_ini in past."""
-    index = np.arange(layout.agents * layout.past).reshape(layout.agents, -1)
-    inputs = layout.inputs * layout.T_ini
-    return index[:, :inputs].ravel(), index[:, inputs:].ravel()
