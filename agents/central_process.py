@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
-from typing import Final
 
 import numpy as np
 
@@ -30,10 +29,8 @@ from quadriga.shared.runtime.arithmetic import use_one_blas_thread
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns
 from quadriga.shared.runtime.scheduling import at_work, end_collection
 from quadriga.shared.runtime.signals import interruptible, stop_on_signals
-from quadriga.shared.topics import EVENT, MEASUREMENT, PLAN, REFERENCE, STATUS
+from quadriga.shared.topics import EVENT, MEASUREMENT, PLAN, REFERENCE, STATUS, Topic
 from quadriga.shared.topics import REFERENCE_EPOCH_MS as EPOCH_MS
-
-_WORKING: Final = "plan"
 
 
 def run(
@@ -57,13 +54,8 @@ def run(
     """
     stopped = stopped or stop_on_signals()
     use_one_blas_thread()
-    team, names = config.team.name, robot_names(config.team.robots)
-    with Bus.open(config.bus, team, PLANNER, stopped) as bus:
+    with Bus.open(config.bus, config.team.name, PLANNER, stopped) as bus:
         shell = _CentralShell(config, Central(config, planner, monotonic_ns), bus)
-        for name in names:
-            bus.subscribe(MEASUREMENT.key(team, name))
-        bus.subscribe(REFERENCE.key(team))
-        bus.subscribe(EVENT.key(team))
         if not join(bus, config, stopped, ProcessInfo(bus, config, predictor_sha256)):
             return
         with interruptible(stopped):
@@ -78,16 +70,20 @@ class _CentralShell:
     """The loop around `Central.step`."""
 
     def __init__(self, config: Config, central: Central, bus: Bus) -> None:
-        team, realtime = config.team.name, config.world.mode == "realtime"
+        team, names = config.team.name, robot_names(config.team.robots)
+        realtime = config.world.mode == "realtime"
         self._config, self._central, self._bus = config, central, bus
-        self._robots = {MEASUREMENT.key(team, n): n for n in robot_names(config.team.robots)}
-        self._put = {
-            name: bus.publisher(PLAN.key(team, name), droppable=realtime)
-            for name in self._robots.values()
+        self._topics: dict[str, tuple[Topic, str]] = {
+            **{MEASUREMENT.key(team, name): (MEASUREMENT, name) for name in names},
+            REFERENCE.key(team): (REFERENCE, ""),
+            EVENT.key(team): (EVENT, ""),
         }
-        self._tell = bus.publisher(STATUS.key(team, PLANNER), droppable=realtime)
+        for key in self._topics:
+            bus.subscribe(key)
+        keys = {name: PLAN.key(team, name) for name in names} | {"": STATUS.key(team, PLANNER)}
+        self._put = {n: bus.publisher(key, droppable=realtime) for n, key in keys.items()}
         self._lead = Liveness(bus, config)
-        self._lockstep = not realtime
+        self._patience = 0.0 if realtime else config.planner.peer_timeout
         self._references: list[Reference] = []
         self._measurements: list[tuple[str, Measurement]] = []
         self._counters: Counter[str] = Counter()
@@ -103,8 +99,8 @@ class _CentralShell:
                 self._lead.poll(self._tick)
             else:
                 self._lead.receive()
-            for key, payload in (packet, *self._bus.drain()) if packet else ():
-                self._take(key, payload)
+                for key, payload in (packet, *self._bus.drain()):
+                    self._take(key, payload)
             state = self._central.remember(state, self._measurements, self._references)
             self._measurements, self._references = [], []
             due = self._central.due(state)
@@ -115,10 +111,6 @@ class _CentralShell:
                 self._tick = state.step * step_ms(self._config)
                 self._publish(state, outputs)
 
-    @property
-    def _patience(self) -> float:
-        return self._config.planner.peer_timeout if self._lockstep else 0.0
-
     def _reference_known(self, state: CentralState, step: int) -> bool:
         """Whether the operator's reference for the time of `step` has arrived."""
         tick = step * step_ms(self._config)
@@ -126,25 +118,22 @@ class _CentralShell:
         return bool(known) and known[-1].tick >= tick - tick % EPOCH_MS
 
     def _take(self, key: str, payload: bytes) -> None:
-        robot = self._robots.get(key)
+        topic, robot = self._topics[key]
         try:
-            if robot is not None:
-                sample = decode(payload, Measurement)
-                self._measurements.append((robot, sample))
-                if sample.tick > self._end:
-                    self._end = -1
-            elif key.endswith(EVENT.name):
-                event = decode(payload, Event)
-                if event.kind == "stop":
-                    self._end = min(event.tick, self._tick + AHEAD_MS)
-            else:
-                reference = decode(payload, Reference)
-                if not is_within_limits(reference):
-                    self._counters[f"dropped_{REFERENCE.name}"] += 1
-                    return
-                self._references.append(reference)
+            message = decode(payload, topic.type)
         except MessageError:
-            self._counters[f"dropped_{key.rpartition('/')[2]}"] += 1
+            message = None
+        if isinstance(message, Measurement):
+            self._measurements.append((robot, message))
+            if message.tick > self._end:
+                self._end = -1
+        elif isinstance(message, Event):
+            if message.kind == "stop":
+                self._end = min(message.tick, self._tick + AHEAD_MS)
+        elif isinstance(message, Reference) and is_within_limits(message):
+            self._references.append(message)
+        else:
+            self._counters[f"dropped_{topic.name}"] += 1
 
     def _publish(self, state: CentralState, outputs: CentralOutputs) -> None:
         for name, plan in outputs.plans:
@@ -156,19 +145,7 @@ class _CentralShell:
             self._counters[f"plan_{code_of(plan.status)}"] += 1
         if state.refused:
             self._counters[REFUSED] = state.refused
-        took = np.array([1e-6 * outputs.planner_ns])
-        self._tell(
-            encode(
-                Status(
-                    plan.tick,
-                    plan.stamp_ns,
-                    _WORKING,
-                    "",
-                    "",
-                    {},
-                    dict(self._counters),
-                    took,
-                    np.zeros(0),
-                )
-            )
-        )
+        took, none = np.array([1e-6 * outputs.planner_ns]), np.zeros(0)
+        counters = dict(self._counters)
+        status = Status(plan.tick, plan.stamp_ns, "plan", "", "", {}, counters, took, none)
+        self._put[""](encode(status))

@@ -189,10 +189,9 @@ def read_options(kind: PlannerKind, text: str) -> dict[str, float]:
             raise ConfigError("planner.options", repr(part), known, hint)
         if name in given:
             raise ConfigError("planner.options", f"{name} twice", "each option once")
-        try:
+        given[name] = math.nan
+        with suppress(ValueError):
             given[name] = float(number)
-        except ValueError:
-            given[name] = math.nan
         if not math.isfinite(given[name]):
             raise ConfigError("planner.options", repr(part), f"{name}=NUMBER, a finite one")
     return {**kind.options, **given}

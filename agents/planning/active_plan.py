@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import field
-from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
@@ -68,8 +67,7 @@ class PlanCheck:
     def __init__(self, config: Config, index: int) -> None:
         self._config, self._index, self._step_ms = config, index, step_ms(config)
         self._most = _SHARE * np.tile(config.planner.deviation_max, N_LEGS) + _MARGIN  # (12,), N
-        # Nominal forces by the gait's phase: a memo, it changes no result.
-        self._nominal: dict[int, Array] = {}
+        self._nominal: dict[int, Array] = {}  # by the gait's phase: a memo, it changes no result
 
     def nominal(self, plan_tick: int) -> Array:
         """Nominal forces of the N samples from a tick on. Shape (N, 12), N."""
@@ -122,21 +120,12 @@ class PlanCheck:
 def trust_scaling(config: PlannerConfig, error: Array) -> float:
     """Share of a plan to apply: 1 inside the range of the data, falling to 0 at twice that range.
 
-    An error that is no number is out of every range.
-
-    Args:
-        config: the range.
-        error: present outputs less the desired ones, shape (6,).
+    `error` is that of the present outputs, (6,); one that is no number is out of every range.
     """
-    ranges = _ranges(config.trust_range)
+    z, speed, tilt, turn = config.trust_range
+    ranges = np.array([z, speed, speed, tilt, tilt, turn])
     share = 2.0 - float(np.maximum.reduce(np.abs(error) / ranges))
     return min(1.0, share) if share > 0.0 else 0.0  # 0 if it is NaN
-
-
-@lru_cache
-def _ranges(trust_range: tuple[float, ...]) -> Array:
-    """Of the six outputs, (6,)."""
-    return np.array(trust_range)[[0, 1, 1, 2, 2, 3]]
 
 
 def add_plan(plans: tuple[ActivePlan, ...], new: ActivePlan) -> tuple[ActivePlan, ...]:

@@ -64,18 +64,18 @@ class Central:
         None once a robot stands where it should walk: it has stopped or is damped, and without
         plans the others stop too.
         """
-        newest = min((_newest(state.windows.get(name, ())) for name in self._names), default=-1)
+        newest = min(_newest(state.windows.get(name, ())) for name in self._names)
         step = newest // self._step_ms
         if step <= state.step or step < first_step(self._config):
             return None
-        windows = [self._window(state, name, step) for name in self._names]
-        whole = all(len(window) == self._config.planner.T_ini for window in windows)
-        return step if whole and not any(map(self._stands, windows)) else None
-
-    def _stands(self, window: Window) -> bool:
-        """Whether at the end of a window all four feet stand: in a trot two of them swing."""
-        begun = window[-1].tick - SAMPLE_MS >= self._config.gait.stand_ms
-        return begun and bool((window[-1].stance > 0.5).all())
+        for name in self._names:
+            window = self._window(state, name, step)
+            if len(window) < self._config.planner.T_ini:
+                return None
+            begun = window[-1].tick - SAMPLE_MS >= self._config.gait.stand_ms
+            if begun and (window[-1].stance > 0.5).all():  # in a trot two feet swing
+                return None
+        return step
 
     def remember(
         self,
@@ -103,13 +103,10 @@ class Central:
         if step is None:
             return state, CentralOutputs()
         tick, begun = step * self._step_ms, self._clock_ns()
-        inputs = [
-            build_planner_inputs(
-                self._config, step, tick, self._window(state, name, step), state.references
-            )
-            for name in self._names
-        ]
-        result = self._planner.step(inputs)
+        windows = [self._window(state, name, step) for name in self._names]
+        result = self._planner.step(
+            [build_planner_inputs(self._config, step, tick, w, state.references) for w in windows]
+        )
         took, used = self._clock_ns() - begun, dict.fromkeys(self._names, step)
         plans = tuple(
             (name, Plan(tick, tick * 1_000_000, step, u, y, result.status, used, 0))

@@ -40,7 +40,6 @@ class NominalPlanning(PlanningInterface[None]):
 
     def initial(self) -> None:
         """No state."""
-        return
 
     def step(self, state: None, inputs: PlanningInputs) -> tuple[None, PlanningOutputs]:
         """No deviation from nominal forces."""
@@ -95,7 +94,11 @@ class CheckedPlanning(PlanningInterface[PlanningState]):
         planner, outputs = self._planner.step(state.planner, inputs)
         plans = state.plans if inputs.mode.name == WALK else ()
         if outputs.plan is not None or outputs.active is not None:
-            if fault := self._find_fault(outputs, inputs.tick):
+            published, followed, now = outputs.plan, outputs.active, inputs.tick
+            fault = "" if published is None else self._check.fault_of(published, now)
+            if not fault and followed is not None:
+                fault = self._check.fault_of_active(followed, now)
+            if fault:
                 outputs = self._refuse(outputs, inputs, fault)
             if outputs.active is not None:
                 plans = add_plan(plans, outputs.active)
@@ -109,25 +112,15 @@ class CheckedPlanning(PlanningInterface[PlanningState]):
         """The QP that `step` solves for these arguments; None if it solves none."""
         return self._planner.problem_of(state.planner, inputs)
 
-    def _find_fault(self, outputs: PlanningOutputs, now: int) -> str:
-        """Why what is published, or what is followed, cannot be meant; "": it can."""
-        fault = "" if outputs.plan is None else self._check.fault_of(outputs.plan, now)
-        if not fault and outputs.active is not None:
-            fault = self._check.fault_of_active(outputs.active, now)
-        return fault
-
     def _refuse(
         self, outputs: PlanningOutputs, inputs: PlanningInputs, fault: str
     ) -> PlanningOutputs:
         """Nominal forces from now on, published if the planner's plan was to be."""
         kind, step = self._config.planner.kind, inputs.tick // step_ms(self._config)
         tick, height = step * step_ms(self._config), self._config.reference.height
-        u, reference = (
-            self._check.nominal(tick),
-            reference_at(inputs.references, inputs.tick, height)[0],
-        )
+        u, plan = self._check.nominal(tick), outputs.plan
+        reference, _ = reference_at(inputs.references, inputs.tick, height)
         y = np.tile(commanded_outputs(reference), (len(u), 1))
-        plan = outputs.plan
         if plan is not None:
             status = with_detail(NOMINAL, f"plan of {kind} refused: {fault}")
             plan = Plan(tick, tick * 1_000_000, step, u, y, status, plan.used, plan.exchange)

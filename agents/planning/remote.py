@@ -71,18 +71,19 @@ class RemotePlanning(PlanningInterface[RemoteState]):
             if self._check.fault_of(plan, tick):  # of another team or time, or forged
                 unusual.append(REFUSED)
             elif state.newest < plan.serial:
-                state, active, share = self._follow(state, plan, inputs)
+                state = replace(state, newest=plan.serial)
+                active, share = self._follow(state, plan, inputs)
                 unusual += [f"plan_{FADED}"] if share < 1.0 else []
         if inputs.mode.name != WALK:
             return state, PlanningOutputs(unusual=tuple(unusual))
         newest_step = state.newest[0]
         due = (tick - self._latency) // self._step_ms
         age = due - max(newest_step, first_due_step(self._config, inputs.mode.since) - 1)
-        plan_tick = self._step_ms * newest_step
+        age_ms = float(tick - self._step_ms * newest_step)
         return state, PlanningOutputs(
             active=active,
             stop_reason=PLANNER_LOST if age > patience(self._config) else "",
-            ages_ms={"plan": float(tick - plan_tick)} if newest_step >= 0 else {},
+            ages_ms={"plan": age_ms} if newest_step >= 0 else {},
             unusual=tuple(unusual),
         )
 
@@ -93,8 +94,8 @@ class RemotePlanning(PlanningInterface[RemoteState]):
 
     def _follow(
         self, state: RemoteState, plan: Plan, inputs: PlanningInputs
-    ) -> tuple[RemoteState, ActivePlan, float]:
-        """Take a plan into force; with the share of it that is applied."""
+    ) -> tuple[ActivePlan, float]:
+        """What is applied of a plan, and the share of its forces that is."""
         share, outputs = 1.0, plan.y
         if state.newest_sample is not None:
             now, _ = reference_at(inputs.references, inputs.tick, self._config.reference.height)
@@ -104,8 +105,7 @@ class RemotePlanning(PlanningInterface[RemoteState]):
             # speeds take over.
             outputs = y_des + share * (plan.y - y_des)
         du = plan.u - self._check.nominal(plan.tick)
-        active = ActivePlan(inputs.tick, plan.tick, share * du, outputs)
-        return replace(state, newest=plan.serial), active, share
+        return ActivePlan(inputs.tick, plan.tick, share * du, outputs), share
 
 
 def central_latency(config: Config) -> int:
