@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Final
 
-from quadriga.doctor.health import Health, judge_team
+from quadriga.doctor.health import WELL, judge_team
 from quadriga.shared.bus.diagnostics import processes
 from quadriga.shared.bus.discovery import ask, describe_process, view_of
 from quadriga.shared.bus.session import POLL, READY, Bus
@@ -38,7 +38,7 @@ def watch_team(config: Config, folder: Path, stopped: Callable[[], bool] | None 
         BusError: the bus cannot be opened.
     """
     stopped, files = stopped or stop_on_signals(), HealthFiles(folder)
-    files.write((Health(DOCTOR),))
+    files.write({DOCTOR: WELL})
     try:
         with Bus.open(config.bus, config.team.name, DOCTOR, stopped) as bus:
             _watch(bus, config, files, stopped)
@@ -64,17 +64,17 @@ class HealthFiles:
         """Begin with none of them."""
         self._folder, self._written = folder, set[Path]()
 
-    def write(self, found: tuple[Health, ...]) -> None:
-        """Write down what was found.
+    def write(self, found: Mapping[str, str]) -> None:
+        """Write down what was found, by name.
 
         Raises:
             ConfigError: the folder cannot be written to.
         """
         expected = "an existing folder that can be written to"
         with name_file_errors(ConfigError, f"--watch {self._folder}", expected):
-            for health in found:
-                path = self._folder / health.name
-                write_text(path, f"{health.line}\n")
+            for name, line in found.items():
+                path = self._folder / name
+                write_text(path, f"{line}\n")
                 self._written.add(path)
 
     def remove(self) -> None:

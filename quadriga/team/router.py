@@ -56,6 +56,6 @@ def run(
         print(f"routing at {listen}", file=sys.stderr, flush=True)
         if once:
             timeout = _STAGES * config.bus.barrier_timeout
-            bus.wait_for(READY, [lead(config)], timeout, stopped, lambda: sleep(POLL))
+            bus.wait_for(READY, [lead(config)], timeout, stopped)
         while not stopped() and (bus.linked or not once):
             sleep(POLL)

@@ -314,18 +314,9 @@ class Bus:
         return frozenset(name for name, count in counts.items() if count > 1)
 
     def wait_for(
-        self,
-        stage: str,
-        names: Iterable[str],
-        timeout: float,
-        stopped: Callable[[], bool],
-        wait: Callable[[], None] = pause,
-        explain: Callable[[frozenset[str]], str] | None = None,
+        self, stage: str, names: Iterable[str], timeout: float, stopped: Callable[[], bool]
     ) -> bool:
         """Wait until all `names` are at `stage`; False if `stopped()` came first.
-
-        Between two looks `wait()` is called, which takes some milliseconds. `explain()` tells at
-        the end why some are absent.
 
         Raises:
             BusError: some were still absent after `timeout` seconds; the message names them.
@@ -336,13 +327,9 @@ class Bus:
             if stopped():
                 return False
             if monotonic() > deadline:
-                raise BusError(
-                    f"barrier of team {self.team!r}, seen by {self.name}",
-                    f"no {', '.join(sorted(absent))} at stage {stage!r} after {timeout:g} s",
-                    f"{', '.join(sorted(wanted))}",
-                    explain(absent) if explain else "not started, or at another endpoint or team",
-                )
-            wait()
+                cause = "not started, or at another endpoint or team"
+                raise absence_error(self, stage, absent, wanted, timeout, cause)
+            pause()
         return True
 
     def close(self) -> None:
@@ -397,6 +384,18 @@ class Bus:
             return
         there = sample.kind == zenoh.SampleKind.PUT
         (self._tokens.add if there else self._tokens.discard)((name, stage, session))
+
+
+def absence_error(
+    bus: Bus, stage: str, absent: Iterable[str], wanted: Iterable[str], after: float, cause: str
+) -> BusError:
+    """The error of who has waited for others for so many seconds."""
+    return BusError(
+        f"barrier of team {bus.team!r}, seen by {bus.name}",
+        f"no {', '.join(sorted(absent))} at stage {stage!r} after {after:g} s",
+        f"{', '.join(sorted(wanted))}",
+        cause,
+    )
 
 
 def _packet(sample: zenoh.Sample) -> Packet:

@@ -97,7 +97,7 @@ def test_the_kernels_share_is_read_of_what_decides_it(
     monkeypatch.setattr(readings, "_RT_RUNTIME", tmp_path / "runtime")
     monkeypatch.setattr(readings, "_FAIR", tmp_path)
     monkeypatch.setattr("platform.release", lambda: release)
-    assert read_machine().reserved == pytest.approx(reserved)
+    assert readings._reserved() == pytest.approx(reserved)
 
 
 def test_little_room_for_what_is_received_matters_in_real_time_alone() -> None:
