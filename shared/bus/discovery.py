@@ -120,7 +120,7 @@ def ask(bus: Bus, names: Collection[str] = ("*",), wait: Pause = pause) -> Answe
         wait()
     answered: Answered = {}
     for question in questions:
-        for arrived_ns, key, payload in question.take():
+        for arrived_ns, key, payload in question.came:
             name = key.split("/")[1]
             answer = MemberAnswer(read_about(name, payload), question.asked_ns, arrived_ns)
             answered.setdefault(name, []).append(answer)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from datetime import UTC, datetime
 from typing import Final, NamedTuple
 
@@ -73,21 +72,17 @@ def missed_ns_of(line: str) -> int:
 class LossTimer:
     """Since when something is gone, and whether that is longer than `grace` seconds.
 
-    Args:
-        find: what is gone at the moment; None: nothing.
-        grace: s.
-
     Attributes:
         since: when the loss was seen first, s of the clock; None: there is none.
     """
 
-    def __init__(self, find: Callable[[], Loss | None], grace: float = 0.0) -> None:
-        self._find, self._grace = find, grace
+    def __init__(self, bus: Bus, config: Config, grace: float = 0.0) -> None:
+        self._bus, self._config, self._grace = bus, config, grace
         self.since: float | None = None
 
     def poll(self) -> Loss | None:
         """What is gone for good; None if all is there, or may be back."""
-        loss, now = self._find(), monotonic()
+        loss, now = find_loss(self._bus, self._config), monotonic()
         if loss is None:
             self.since = None
             return None
@@ -113,7 +108,7 @@ class Liveness:
     """
 
     def __init__(self, bus: Bus, config: Config) -> None:
-        self._timer = LossTimer(lambda: find_loss(bus, config), LAST_PACKETS)
+        self._timer = LossTimer(bus, config, LAST_PACKETS)
         self._bus, self._config = bus, config
         self._walks = False
         self._silent_since: float | None = None  # since the end was announced

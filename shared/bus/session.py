@@ -18,7 +18,7 @@ import zenoh
 
 from quadriga.shared.about import HERE as HERE
 from quadriga.shared.about import READY as READY
-from quadriga.shared.bus.ring_buffer import INBOX, Mailbox, Newest
+from quadriga.shared.bus.ring_buffer import Mailbox, Newest
 from quadriga.shared.bus.settings import (
     NO_LINK,
     check_trust,
@@ -37,6 +37,7 @@ Packet = tuple[str, bytes]  # key, payload as received
 Arrival = tuple[int, str, bytes]  # when, ns of `monotonic_ns`, and the packet
 Answer = tuple[int, str, bytes]  # when, ns of the wall clock, and key and payload
 
+_INBOX: Final = 1 << 16  # packets that wait for a process at most, some seconds of ten robots
 POLL: Final = 0.05  # s, longest wait before a loop looks at its stop flag
 _ACK_TIMEOUT: Final = 2.0  # s
 _LINK_TIMEOUT: Final = 5.0  # s
@@ -53,29 +54,25 @@ def pause() -> None:
 
 
 class Answers:
-    """The answers to one question; a thread that receives them fills it, another one reads it.
+    """The answers to one question; a thread that receives them adds to it, another one reads it.
 
     Attributes:
         asked_ns: when the question was asked, by the wall clock.
         over: whether nothing more will come: all who can answer have, or the time is over.
+        came: what has come, oldest first.
     """
 
     def __init__(self) -> None:
-        self.asked_ns, self.over = wall_ns(), False
-        self._answers: SimpleQueue[Answer] = SimpleQueue()
+        self.asked_ns, self.over, self.came = wall_ns(), False, list[Answer]()
 
     def note(self, reply: zenoh.Reply) -> None:
         """An answer has come."""
         if reply.ok is not None:
-            self._answers.put((wall_ns(), *_packet(reply.ok)))
+            self.came.append((wall_ns(), *_packet(reply.ok)))
 
     def end(self) -> None:
         """Nothing more will come."""
         self.over = True
-
-    def take(self) -> list[Answer]:
-        """All that has come since this was called last, oldest first."""
-        return [self._answers.get_nowait() for _ in range(self._answers.qsize())]
 
 
 class Bus:
@@ -85,6 +82,10 @@ class Bus:
     token `<team>/<name>/<stage>/<session>`: it vanishes within milliseconds when its process dies,
     and the session in it tells two processes of the same name apart. A process's last packets may
     arrive after its token has vanished.
+
+    Attributes:
+        oversized: payloads that were dropped because of their size so far.
+        standstill: how long this process has not run.
     """
 
     def __init__(self, session: zenoh.Session, team: str, name: str) -> None:
@@ -92,11 +93,10 @@ class Bus:
         self.team, self.name = team, name
         self._session = session
         self._me = str(session.info.zid())
-        self._inbox: Mailbox[zenoh.Sample] = Mailbox(INBOX)
-        self._oversized: SimpleQueue[None] = SimpleQueue()  # counts what several threads drop
+        self._inbox: Mailbox[zenoh.Sample] = Mailbox(_INBOX)
         self._tokens: set[tuple[str, str, str]] = set()  # of others: name, stage, session
         self._declared: dict[str, zenoh.LivelinessToken] = {}
-        self._closed, self.standstill = False, Standstill()
+        self._closed, self.oversized, self.standstill = False, 0, Standstill()
         tokens, ack = f"{team}/*/*/*", f"{team}/{name}/{RECEIVED}"
         # Zenoh drops publishers and subscribers nobody refers to.
         self._declarations: list[Any] = [
@@ -221,16 +221,11 @@ class Bus:
 
         def put(sample: zenoh.Sample) -> None:
             if len(sample.payload) > largest:
-                self._oversized.put(None)
+                self.oversized += 1  # by one thread, see `_ONE_RECEIVES`
             else:
                 self._inbox.put(sample)
 
         self._hear(key, _direct(put if largest else self._inbox.put))
-
-    @property
-    def oversized(self) -> int:
-        """Payloads that were dropped because of their size so far."""
-        return self._oversized.qsize()
 
     @property
     def dropped(self) -> int:

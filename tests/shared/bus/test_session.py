@@ -123,7 +123,7 @@ def test_the_newest_messages_are_kept_and_the_inbox_has_none(opened: Open) -> No
         put(b"%d" % k)
 
     def is_last() -> bool:
-        seen.extend(newest.take(2).payloads)
+        seen.extend(newest.take(2)[1])
         return seen[-1:] == [b"999"]
 
     wait_until(is_last)
@@ -399,7 +399,7 @@ def test_the_thread_that_receives_stays_known_to_python(opened: Open) -> None:
     for _ in range(20):
         answers = r1.ask("team/calls", 20.0)
         wait_until(lambda: answers.over)  # noqa: B023
-        for _, _, payload in answers.take():
+        for _, _, payload in answers.came:
             thread, _, calls = payload.partition(b" ")
             told.setdefault(thread, []).append(int(calls))
     assert len(told) <= 4
