@@ -100,6 +100,29 @@ def test_the_kernels_share_is_read_of_what_decides_it(
     assert readings._reserved() == pytest.approx(reserved)
 
 
+def test_the_kernel_s_struct_is_read_where_its_fields_are() -> None:
+    """Two fields behind those that are used have known values."""
+    found = readings.Timex()
+    assert readings._adjtimex(found) >= 0
+    tolerance, tick = found.rest[2], found.rest[5]
+    assert tolerance == 500 << 16  # ppm, of which 16 bits are a fraction
+    assert 9_000 <= tick <= 11_000  # µs between two of 100 a second
+
+
+@pytest.mark.parametrize(
+    ("status", "maxerror", "error"), [(0x0040, 10, 0.0), (0x2001, 250, 250e-6), (0x2001, 0, 100e-6)]
+)
+def test_the_error_is_none_of_a_clock_that_nobody_keeps_and_never_nothing(
+    monkeypatch: pytest.MonkeyPatch, status: int, maxerror: int, error: float
+) -> None:
+    def adjtimex(timex: readings.Timex) -> int:
+        timex.status, timex.maxerror = status, maxerror
+        return 0
+
+    monkeypatch.setattr(readings, "_adjtimex", adjtimex)
+    assert readings._clock_error() == pytest.approx(error)
+
+
 def test_little_room_for_what_is_received_matters_in_real_time_alone() -> None:
     assert verdicts(receive_buffer=212_992) == {"buffer": NOTE}
     assert verdicts(LOCKSTEP, receive_buffer=212_992) == {}

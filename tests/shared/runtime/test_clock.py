@@ -33,7 +33,7 @@ def test_a_late_turn_is_counted_and_caught_up() -> None:
     for _ in range(3):
         loop.wait()
     assert clock.now == pytest.approx(0.04)
-    assert (loop.overruns, loop.lost) == (1, 0.0)
+    assert loop.overruns == 1
 
 
 def test_after_a_long_freeze_the_schedule_moves() -> None:
@@ -44,4 +44,3 @@ def test_after_a_long_freeze_the_schedule_moves() -> None:
     assert loop.wait() == 0.0
     assert clock.now == pytest.approx(60.01)
     assert loop.overruns == 1
-    assert loop.lost == pytest.approx(59.99)

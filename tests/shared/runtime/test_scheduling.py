@@ -14,7 +14,7 @@ from tests.permitted import permitted
 
 _SCRIPT = """
 import os, sys, threading
-from quadriga.shared.runtime.scheduling import has_priority, leave_priority, take_priority
+from quadriga.shared.runtime.scheduling import leave_priority, take_priority
 if sys.argv[2] == "deny":
     os.setuid(65534)
 threading.Thread(target=threading.Event().wait, daemon=True).start()
@@ -22,7 +22,7 @@ taken = take_priority(sys.argv[1])
 if sys.argv[2] == "leave":
     leave_priority()
 policies = {os.sched_getscheduler(int(task)) for task in os.listdir("/proc/self/task")}
-print(taken, has_priority(), policies == {os.SCHED_RR}, policies == {os.SCHED_OTHER})
+print(taken, policies == {os.SCHED_RR}, policies == {os.SCHED_OTHER})
 """
 
 
@@ -43,12 +43,12 @@ def answer(priority: str, permission: str) -> tuple[list[str], str]:
 
 @pytest.mark.skipif(not permitted(), reason="this user may not schedule in real time")
 def test_all_threads_are_scheduled_in_real_time() -> None:
-    assert answer("realtime", "") == (["True", "True", "True", "False"], "")
+    assert answer("realtime", "") == (["True", "True", "False"], "")
 
 
 @pytest.mark.skipif(not permitted(), reason="this user may not schedule in real time")
 def test_who_leaves_is_ordinary_again() -> None:
-    assert answer("realtime", "leave") == (["True", "False", "False", "True"], "")
+    assert answer("realtime", "leave") == (["True", "False", "True"], "")
 
 
 @pytest.mark.parametrize("priority", ["realtime", "ordinary"])
@@ -56,7 +56,7 @@ def test_the_environment_overrides_the_configuration(
     priority: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv(VARIABLE, "ordinary")
-    assert answer(priority, "") == (["False", "False", "False", "True"], "")
+    assert answer(priority, "") == (["False", "False", "True"], "")
 
 
 def test_a_priority_of_the_environment_that_there_is_not_is_refused(
@@ -72,7 +72,7 @@ def test_a_priority_of_the_environment_that_there_is_not_is_refused(
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can become a user without the right")
 def test_without_the_right_it_runs_all_the_same() -> None:
     found, message = answer("realtime", "deny")
-    assert found == ["False", "False", "False", "True"]
+    assert found == ["False", "False", "True"]
     assert message.startswith("no real-time scheduling (Operation not permitted)")
     assert "`USER - rtprio 1` in /etc/security/limits.d" in message
 
