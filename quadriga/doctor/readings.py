@@ -13,8 +13,9 @@ from functools import partial
 from pathlib import Path
 from typing import Final, TypeVar
 
+from packaging.requirements import Requirement
+
 from quadriga.doctor.machine import MachineReadings
-from quadriga.doctor.packages import split_requirement
 from quadriga.shared.runtime.installed import PROJECT, shadowing_files
 from quadriga.shared.runtime.places import cache_dir
 from quadriga.team.run_folder import RUNS
@@ -37,7 +38,7 @@ _CACHE_BYTES: Final = 200_000_000  # of machine code, and of data and predictors
 def read_machine() -> MachineReadings:
     """Look at this computer, as this user and in this folder; nothing is changed."""
     requirements = _read(_requirements)
-    names = [split_requirement(line)[0] for line in requirements or ()]
+    names = [Requirement(line).name for line in requirements or ()]
     versions = {name: _read(partial(importlib.metadata.version, name)) for name in names}
     return MachineReadings(
         realtime=_read(_may_take_realtime),

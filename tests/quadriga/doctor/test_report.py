@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-import re
 
-from quadriga.doctor import machine, packages
 from quadriga.doctor.examine import LINK
+from quadriga.doctor.machine import check_machine
 from quadriga.doctor.report import DoctorReport, MemberReport, format_report, to_json
 from quadriga.shared.bus.diagnostics import BAD, GOOD, NOTE, UNKNOWN, Diagnosis
-from quadriga.shared.members import OPERATOR, RECORDER
 from quadriga.shared.runtime.places import SOURCE
+from tests.quadriga.doctor.test_machine import FIT, WALK
 from tests.shared.bus.abouts import about, answer
 
 DOC = (SOURCE / "docs" / "doctor.md").read_text(encoding="utf-8")
@@ -60,12 +59,6 @@ def test_every_field_of_the_json_is_documented() -> None:
 
 
 def test_every_code_of_this_computer_is_documented() -> None:
-    values = {
-        value
-        for module in (machine, packages)
-        for name, value in vars(module).items()
-        if name.isupper() and isinstance(value, str) and re.fullmatch(r"[a-z][a-z-]*[a-z]", value)
-    }
-    codes = {*values, LINK} - {GOOD, NOTE, BAD, UNKNOWN, OPERATOR, RECORDER}
-    assert {"governor", "packages", "link"} <= codes
-    assert {code for code in codes if f"`{code}`" not in DOC} == set()
+    codes = [item.code for item in check_machine(FIT, WALK)]
+    assert len({*codes}) == 10
+    assert {code for code in (*codes, LINK) if f"`{code}`" not in DOC} == set()
