@@ -177,7 +177,7 @@ def test_a_version_is_held_against_its_bounds(requirement: str, version: str, ve
 
 def test_a_package_that_is_wrong_is_named() -> None:
     found = check_packages(("numpy>=2.0,<3", "osqp>=1.1"), {"numpy": "1.26"})
-    assert found.text == "numpy is 1.26, not >=2.0,<3; osqp is not installed"
+    assert found.text == "numpy is 1.26, not <3,>=2.0; osqp is not installed"
 
 
 def test_this_computer_is_read_and_has_the_packages_that_it_is_tested_with() -> None:
