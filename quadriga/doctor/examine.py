@@ -83,9 +83,7 @@ def _look_at_team(config: Config, me: About) -> tuple[TeamView, Diagnosis]:
             raise
         return view, _judge_reach(reach, waiting=False)
     with bus:
-        deadline = monotonic() + _LINK_TIMEOUT
-        while not bus.linked and monotonic() < deadline:
-            pause()
+        bus.wait_for_link(_LINK_TIMEOUT)
         deadline = monotonic() + _SETTLE
         while bus.linked and not members(config) <= bus.members_at(HERE):
             if monotonic() > deadline:

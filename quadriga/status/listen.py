@@ -133,9 +133,7 @@ def listening(
     """
     with Bus.open(config.bus, config.team.name, f"{name}-{os.getpid()}", stopped) as bus:
         listener = TeamListener(config, bus, every_topic=every_topic)
-        until = monotonic() + _LINK_TIMEOUT
-        while not bus.linked and not stopped() and monotonic() < until:
-            sleep(_PAUSE)
+        bus.wait_for_link(_LINK_TIMEOUT, stopped)
         yield listener
 
 

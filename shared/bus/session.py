@@ -145,18 +145,13 @@ class Bus:
         """Join the network at `bus.endpoint`; in peer mode be who listens there if nobody does.
 
         For a process that must be found although no plant runs. If somebody listens there,
-        this waits for the link to them.
-
-        Raises:
-            BusError: the endpoint is malformed, or in client mode there is no router.
+        this waits for the link to them. It raises what `open` does.
         """
         if bus.mode == "peer":
             with suppress(BusError):  # somebody listens there, or it is another machine's
                 return cls(_open(member_settings(bus, name, hub=True), name), team, name)
         joined = cls.open(bus, team, name)
-        deadline = monotonic() + _LINK_TIMEOUT
-        while not joined.linked and monotonic() < deadline:
-            pause()
+        joined.wait_for_link(_LINK_TIMEOUT)
         return joined
 
     @classmethod
@@ -188,6 +183,12 @@ class Bus:
     def linked(self) -> bool:
         """Whether anyone is linked to this process at the moment."""
         return bool(self._session.info.links())
+
+    def wait_for_link(self, timeout: float, stopped: Callable[[], bool] = lambda: False) -> None:
+        """Wait until anyone is linked, for `timeout` seconds at most, or until `stopped()`."""
+        deadline = monotonic() + timeout
+        while not (self.linked or stopped()) and monotonic() < deadline:
+            pause()
 
     def publisher(
         self, key: str, *, droppable: bool = False, urgent: bool = False

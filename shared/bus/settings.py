@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import socket
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
@@ -121,23 +121,6 @@ def router_settings(listen: str, bus: BusConfig, rules: Mapping[str, Any]) -> di
         **rules,
         **_certificates(bus, listen, ROUTER, listens=True),
     }
-
-
-def link_settings(bus: BusConfig, listen: str, links: Sequence[str]) -> dict[str, Any]:
-    """What a router that listens at `listen` is told besides of those at the endpoints `links`.
-
-    Raises:
-        ConfigError: one is open to others, or there are certificates: whoever is linked as a router
-            speaks for everybody behind it, so one stolen certificate would command all robots.
-    """
-    for endpoint in links:
-        check_exposure(replace(bus, mode="client"), "--link", endpoint)
-        if is_tls(endpoint) or is_tls(listen):
-            expected = "one router for all of a team with certificates"
-            cause = "the rules are for each process, and a router speaks for all behind it"
-            raise ConfigError("--link", f"{endpoint!r} of a router at {listen}", expected, cause)
-    retry = {"connect/exit_on_failure": False, "connect/timeout_ms": -1, "connect/retry": _RETRY}
-    return {"connect/endpoints": list(links), **retry} if links else {}
 
 
 def _certificates(bus: BusConfig, endpoint: str, name: str, *, listens: bool) -> Mapping[str, Any]:
