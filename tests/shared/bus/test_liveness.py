@@ -24,7 +24,7 @@ from quadriga.shared.errors import ProcessError
 from quadriga.shared.members import SIM
 from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns
 from quadriga.team.endpoint import free_endpoint
-from tests.shared.bus.test_session import wait_until
+from tests.shared.bus.test_session import WAIT, wait_until
 
 LOSS = Loss(LEAD_GONE, "process sim")
 
@@ -46,18 +46,11 @@ def together(config: Config) -> Iterator[tuple[Bus, Bus]]:
 
 def complaint(watch: Liveness, tick: int) -> str:
     """What is said in the end."""
-    said = ""
-
-    def poll() -> str:
-        nonlocal said
-        try:
+    deadline = monotonic() + WAIT
+    with pytest.raises(ProcessError) as caught:  # noqa: PT012
+        while monotonic() < deadline:
             watch.poll(tick)
-        except ProcessError as error:
-            said = str(error)
-        return said
-
-    wait_until(poll)
-    return said
+    return str(caught.value)
 
 
 def test_who_drives_time_is_missed_after_its_last_words() -> None:

@@ -27,8 +27,7 @@ TWO = load(None, {"team.robots": 2})
 
 
 def rights(**given: object) -> dict[str, Rights]:
-    config = load(None, {"team.robots": 2, **given})
-    return team_rights(config)
+    return team_rights(load(None, {"team.robots": 2, **given}))
 
 
 def test_a_robot_sends_under_its_own_key_and_hears_its_own_state() -> None:
@@ -95,9 +94,8 @@ def test_the_router_denies_whatever_no_identity_has_a_right_to() -> None:
     assert all("interfaces" not in entry for entry in (*block["rules"], *block["subjects"]))
     ids = [rule["id"] for rule in block["rules"]]
     assert len(ids) == len({*ids})
-    assert {s["id"]: s["cert_common_names"] for s in block["subjects"]} == {
-        n: [n] for n in rights()
-    }
+    names = {s["id"]: s["cert_common_names"] for s in block["subjects"]}
+    assert names == {name: [name] for name in rights()}
     for name, own in rights().items():
         assert keys_of(block, name, "ingress") == {*own.publishes}
         assert keys_of(block, name, "egress") == {*own.hears}
@@ -127,13 +125,8 @@ def test_everybody_who_may_be_on_the_bus_has_an_identity() -> None:
 
 LENGTHS = {"N": 100, "n": 10, "k": 45, "P": 1000, "K": 10_000}
 LARGEST: dict[type, Any] = {
-    **{
-        int: 1 << 41,
-        float: 1.0,
-        bool: True,
-        str: "ä" * 4096,
-        list: ("measurement:r10:4711",) * 500,
-    },
+    **{int: 1 << 41, float: 1.0, bool: True, str: "ä" * 4096},
+    list: ("measurement:r10:4711",) * 500,
     dict: {f"counter of something {k}": 1 << 41 for k in range(300)},
 }
 
