@@ -93,13 +93,9 @@ class ClockOffset(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
-    """What came of one look at a process or a computer.
+    """What came of one look at a process or a computer, for programs and in words.
 
-    Attributes:
-        code: what was found or looked at, for programs.
-        verdict: `GOOD`, `NOTE`, `BAD` or `UNKNOWN`.
-        text: the same in words.
-        remedy: what to do about it; "": nothing.
+    `verdict` is `GOOD`, `NOTE`, `BAD` or `UNKNOWN`; `remedy` is what to do about it, if anything.
     """
 
     code: str
@@ -110,12 +106,9 @@ class Diagnosis:
 
 @dataclass(frozen=True, slots=True)
 class MemberAnswer:
-    """What one process has said of itself.
+    """What one process has said of itself, None if it cannot be read.
 
-    Attributes:
-        about: None: it cannot be read.
-        asked_ns: when it was asked, by the asker's wall clock.
-        arrived_ns: when the answer came, by the same clock.
+    When it was asked and when the answer came is by the asker's wall clock, ns.
     """
 
     about: About | None

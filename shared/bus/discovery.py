@@ -109,10 +109,7 @@ def describe_process(config: Config, name: str, predictor_sha256: str = "") -> A
 def ask(bus: Bus, names: Collection[str] = ("*",), wait: Pause = pause) -> Answered:
     """What processes say of themselves, by name, once all have answered or a second has passed.
 
-    Args:
-        bus: where they are.
-        names: whom to ask; by default everybody.
-        wait: called all the time meanwhile; takes some milliseconds.
+    By default everybody is asked. Meanwhile `wait()` is called all the time, some ms each.
     """
     questions = [bus.ask(about_key(bus.team, name), _TIMEOUT) for name in names]
     deadline = monotonic() + _TIMEOUT + _GRACE
@@ -155,13 +152,9 @@ def read_about(name: str, payload: bytes) -> About | None:
 def view_of(
     bus: Bus, config: Config, answered: Answered, fallback: About | None = None
 ) -> TeamView:
-    """What a process sees of its team: who is on the bus, and what they have said.
+    """What a process sees of its team: who is on the bus, and what `ask` has given.
 
-    Args:
-        bus: its own.
-        config: the one it has.
-        answered: what `ask` has given.
-        fallback: with what all are compared where the process that drives time says nothing.
+    Where the process that drives time says nothing, all are compared with `fallback`.
     """
     linked = bus.linked or bus.name in LEADS  # to whom all others link
     view = TeamView(linked, bus.members_at(HERE), bus.duplicates(HERE), members(config), answered)
@@ -177,14 +170,8 @@ def join(
     A token is seen over the link its process uses for everything else, behind its subscriptions:
     whoever is seen will receive what is published from now on.
 
-    Args:
-        bus: this process's.
-        config: the team's configuration.
-        stopped: asked often whether to stop.
-        info: what this process says of itself; by default that it has no predictor.
-
-    Returns:
-        False if `stopped()` came first.
+    By default this process says of itself that it has no predictor. False if `stopped()` came
+    first.
 
     Raises:
         BusError: some did not come in time, the team walks already, has such a member already, or
@@ -257,10 +244,7 @@ def await_members(
 def await_agents(bus: Bus, config: Config, stopped: Callable[[], bool]) -> bool:
     """A robot's wait until all but plants are ready: only then it stands up.
 
-    False if `stopped()` came first.
-
-    Raises:
-        BusError: some were not ready in time, or do not belong to this team.
+    False if `stopped()` came first; raises as `start_together`.
     """
     names = {member.name for member in processes(config) if member.role.name != SIM}
     if not await_members(bus, config, READY, names, stopped):
@@ -296,12 +280,6 @@ def check_others(bus: Bus, config: Config, names: Collection[str], wait: Pause =
     """Refuse to walk with others that differ, or do not say what they are.
 
     A controller of one's own need not say it; one that does must not differ.
-
-    Args:
-        bus: this process's, which drives time or is the plant of a robot.
-        config: its configuration.
-        names: the others.
-        wait: called all the time while they are asked.
 
     Raises:
         BusError: one differs, or gives no answer; the message names it and in what it differs.

@@ -46,8 +46,7 @@ def find_loss(bus: Bus, config: Config) -> Loss | None:
 def loss_error(loss: Loss, tick: int, missed_ns: int = 0, note: str = "") -> ProcessError:
     """The error of a process that ends because of a loss at a tick, ms.
 
-    `missed_ns` is when it was missed first, ns since 1970; 0: that is not known. `note` is what
-    the process has to say of itself, see `Standstill`.
+    `missed_ns` is when it was missed first, ns since 1970; 0: unknown. `note`: see `Standstill`.
     """
     cause = "killed, failed, or cut off: see what it says itself"
     if loss.code == LINK_LOST:
@@ -126,10 +125,7 @@ class Liveness:
         return now - self._silent_since >= LAST_PACKETS or bool(find_loss(self._bus, self._config))
 
     def poll(self, tick: int) -> None:
-        """See whether the others are there; called while nothing arrives.
-
-        Args:
-            tick: the team's time as far as this process knows it, ms.
+        """See whether the others are there; called while nothing arrives, with the team's time, ms.
 
         Raises:
             ProcessError: who drives time, or the link to the router, is gone.

@@ -164,17 +164,8 @@ class Bus:
     ) -> Self:
         """Be the router through which the processes in client mode reach each other.
 
-        It passes on what any team sends, and sees the presence of `team`.
-
-        Args:
-            listen: the endpoint they connect to; `tls/0.0.0.0:PORT` accepts other machines.
-            team: the team to look at.
-            bus: the configuration, for its certificates.
-            rules: what it lets through; by default everything.
-
-        Raises:
-            ConfigError: the endpoint is open to others, or a certificate is missing.
-            BusError: the endpoint is malformed, cannot be bound, or is already in use.
+        It passes on what any team sends, by default everything, and sees the presence of `team`.
+        `tls/0.0.0.0:PORT` accepts other machines. It raises what `open` does.
         """
         settings = router_settings(listen, bus or BusConfig(), rules)
         return cls(_open(settings, ROUTER), team, ROUTER)
@@ -199,7 +190,7 @@ class Bus:
 
         Args:
             key: the full key, `<team>/…`.
-            droppable: when a receiver is slow, drop (real time) instead of waiting for it.
+            droppable: drop when a receiver is slow (real time) instead of waiting for it.
             urgent: overtake all else and never wait; dropped only where nothing goes through.
         """
         control = zenoh.CongestionControl

@@ -72,10 +72,7 @@ _CAUSES: Final = {
 def member_settings(bus: BusConfig, name: str, *, hub: bool = False) -> dict[str, Any]:
     """Zenoh's settings of a process of the team; only the configured endpoints are opened.
 
-    Args:
-        bus: the configuration.
-        name: of the process; in peer mode the one that drives time is who they all find.
-        hub: be who they find although the name is another.
+    In peer mode the process that drives time is who they all find, or who is the `hub`.
 
     Raises:
         ConfigError: the endpoint is open to others, or a certificate is missing.
@@ -100,12 +97,7 @@ def member_settings(bus: BusConfig, name: str, *, hub: bool = False) -> dict[str
 
 
 def router_settings(listen: str, bus: BusConfig, rules: Mapping[str, Any]) -> dict[str, Any]:
-    """Zenoh's settings of the router that clients connect to at endpoint `listen`.
-
-    Args:
-        listen: where it listens.
-        bus: the configuration.
-        rules: what it lets through, as Zenoh is told it.
+    """Zenoh's settings of the router that clients connect to at `listen`, by its rules of access.
 
     Raises:
         ConfigError: the endpoint is open to others, or a certificate is missing.
@@ -132,13 +124,9 @@ def _certificates(bus: BusConfig, endpoint: str, name: str, *, listens: bool) ->
 
 
 def opening_error(settings: dict[str, Any], at: str, name: str, error: str) -> BusError:
-    """The error of a process `name` that cannot join the network.
+    """The error of a process `name` that cannot join the network, out of Zenoh's words.
 
-    Args:
-        settings: all of Zenoh's.
-        at: the last of them that was set; Zenoh often does not say which one is wrong.
-        name: the process.
-        error: Zenoh's words.
+    Zenoh often does not say which setting is wrong: `at` is the last that was set.
     """
     connect, listen = settings["connect/endpoints"], settings["listen/endpoints"]
     key, endpoint = "bus.endpoint", (connect or listen)[0]
