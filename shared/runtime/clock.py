@@ -70,6 +70,7 @@ class Rate:
 
     Attributes:
         overruns: turns that began late by more than one period.
+        lost: by how much the schedule has been moved in all, s.
     """
 
     def __init__(
@@ -80,7 +81,7 @@ class Rate:
         slack: float = 20.0,
     ) -> None:
         self._period, self._now, self._pause, self._slack = period, now, pause, slack
-        self._next, self.overruns = now(), 0
+        self._next, self.overruns, self.lost = now(), 0, 0.0
 
     def wait(self) -> float:
         """Wait for the next turn and return how late it begins, in seconds."""
@@ -91,7 +92,9 @@ class Rate:
         late = max(self._now() - self._next, 0.0)
         self.overruns += late > self._period
         if late > self._slack * self._period:
-            self._next = self._now()
+            now = self._now()
+            self.lost += now - self._next
+            self._next = now
         return late
 
 

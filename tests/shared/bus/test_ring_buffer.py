@@ -38,10 +38,13 @@ def test_a_signal_whose_handler_takes_longer_than_the_timeout_makes_nobody_wait_
 @pytest.mark.parametrize("most", [_ALL, 50])
 def test_all_items_come_each_threads_own_in_order_or_are_counted(most: int) -> None:
     mailbox, taken = Mailbox[tuple[int, int]](most), list[tuple[int, int]]()
-    threads = [
-        Thread(target=lambda who=who: [mailbox.put((who, k)) for k in range(_ITEMS)])
-        for who in range(_THREADS if most == _ALL else 1)  # several lose some of the count
-    ]
+
+    def put_all(who: int) -> None:
+        for k in range(_ITEMS):
+            mailbox.put((who, k))
+
+    senders = _THREADS if most == _ALL else 1  # several lose some of the count
+    threads = [Thread(target=put_all, args=(who,)) for who in range(senders)]
     for thread in threads:
         thread.start()
     while any(thread.is_alive() for thread in threads):

@@ -272,9 +272,12 @@ def test_an_endpoint_that_cannot_be_opened(
 
 
 def test_nobody_is_reached_from_other_machines_unasked() -> None:
-    for name, elsewhere in (("endpoint", "tcp/203.0.113.1:1"), ("listen", "tcp/0.0.0.0:0")):
-        with pytest.raises(ConfigError, match=rf"bus\.{name}: got .*bus\.plaintext = true"):
-            Bus.open(BusConfig(**{name: elsewhere}), "team", "r1")
+    for key, config in (
+        ("endpoint", BusConfig(endpoint="tcp/203.0.113.1:1")),
+        ("listen", BusConfig(listen="tcp/0.0.0.0:0")),
+    ):
+        with pytest.raises(ConfigError, match=rf"bus\.{key}: got .*bus\.plaintext = true"):
+            Bus.open(config, "team", "r1")
     with pytest.raises(ConfigError, match="--listen: got"):
         Bus.route("tcp/0.0.0.0:7447", "team")
 

@@ -28,20 +28,20 @@ def test_a_punctual_loop_keeps_its_schedule(clock: ManualClock, loop: Rate) -> N
     assert loop.overruns == 0
 
 
-@pytest.mark.parametrize(
-    ("work", "late", "next_late", "after_three"),
-    [
-        (0.025, 0.015, 0.005, 0.04),  # two and a half periods: caught up
-        (60.0, 59.99, 0.0, 60.03),  # a freeze: the schedule moves
-    ],
-)
-def test_a_late_turn_is_counted(
-    clock: ManualClock, loop: Rate, work: float, late: float, next_late: float, after_three: float
-) -> None:
-    clock.sleep(work)
-    assert loop.wait() == pytest.approx(late)
-    assert loop.wait() == pytest.approx(next_late)
-    loop.wait()
-    loop.wait()
-    assert clock.now == pytest.approx(after_three)
+def test_a_late_turn_is_counted_and_caught_up(clock: ManualClock, loop: Rate) -> None:
+    clock.sleep(0.025)  # one turn that takes two and a half periods
+    assert loop.wait() == pytest.approx(0.015)
     assert loop.overruns == 1
+    for _ in range(3):
+        loop.wait()
+    assert clock.now == pytest.approx(0.04)
+    assert (loop.overruns, loop.lost) == (1, 0.0)
+
+
+def test_after_a_long_freeze_the_schedule_moves(clock: ManualClock, loop: Rate) -> None:
+    clock.sleep(60.0)
+    assert loop.wait() == pytest.approx(59.99)
+    assert loop.wait() == 0.0
+    assert clock.now == pytest.approx(60.01)
+    assert loop.overruns == 1
+    assert loop.lost == pytest.approx(59.99)
