@@ -17,7 +17,7 @@ from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError
 from quadriga.shared.members import LEADS, has_lead
-from quadriga.shared.runtime.clock import monotonic_ns, sleep, wall_ns, wall_offset
+from quadriga.shared.runtime.clock import monotonic_ns, sleep, wall_ns, wall_offset_ns
 
 _TICK_NS: Final = 1_000_000
 _LEAST_GAP_NS: Final = _TICK_NS // 2  # between the beginnings of two ticks
@@ -76,7 +76,7 @@ class TeamPace:
             start = self._hear_start(pause, stopped)
         else:
             start = self._me.start_ns = wall_ns() + _AHEAD_NS
-        self._start = start - wall_offset()[0]
+        self._start = start - wall_offset_ns()
         while monotonic_ns() < self._start - _QUIET_NS:
             if stopped():
                 return False

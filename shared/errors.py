@@ -87,13 +87,7 @@ def _cut(text: str) -> str:
 def name_file_errors(
     kind: type[QuadrigaError], name: object, expected: str, cause: str = ""
 ) -> Iterator[None]:
-    """Name the file that the system refuses within the block.
-
-    Args:
-        kind: of the error that is raised instead of the system's.
-        name: the file or folder.
-        expected: what would have been right.
-        cause: the likely cause or the remedy; may be empty.
+    """Name the file that the system refuses within the block, in an error of this kind.
 
     Raises:
         QuadrigaError: of this kind; a file cannot be read or written, or its text is not UTF-8.

@@ -31,15 +31,10 @@ LEADS: Final = frozenset((SIM, "plant_r1"))
 
 @dataclass(frozen=True, slots=True)
 class Role:
-    """One row of the table.
+    """One row of the table; its only process has its name, agents and plants see `team_members`.
 
-    Attributes:
-        name: of the role, and of its only process; an agent's process has its robot's name, and
-            the plant of a single robot that of `plant_name`.
-        command: the subcommand of `quadriga` that is this process.
-        per_robot: whether there is one for each robot.
-        predicts: whether it reads a predictor.
-        grace: how long it may take to leave once the walk is over or it is told to, s.
+    `command` is the subcommand of `quadriga` that is this process, `grace` how long it may take to
+    leave once the walk is over or it is told to, s.
     """
 
     name: str
@@ -96,7 +91,7 @@ def team_members(
     """The processes of a team, in the order of the table.
 
     Args:
-        robots: their names.
+        robots: their names, which their agents have too.
         central: whether one process plans for all.
         recorded: whether the team waits for a recorder.
         plant_each: whether each robot has a plant of its own.

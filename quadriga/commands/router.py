@@ -11,13 +11,6 @@ from quadriga.shared.config.sections import Config
 def add(add_command: AddCommand) -> None:
     command = add_command("router", run, "the router between processes in client mode")
     command.add_argument("--listen", metavar="ENDPOINT", help="where (bus.endpoint)")
-    command.add_argument(
-        "--link",
-        metavar="ENDPOINT",
-        action="append",
-        default=[],
-        help="another router of the team without certificates, to pass on to; may be repeated",
-    )
     command.add_argument("--once", action="store_true", help="leave when the team has walked")
 
 
@@ -26,5 +19,5 @@ def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
     from quadriga.team import router
 
     listen = arguments.listen or config.bus.endpoint
-    router.run(config, listen, once=arguments.once, links=arguments.link)
+    router.run(config, listen, once=arguments.once)
     return 0

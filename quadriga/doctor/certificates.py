@@ -1,89 +1,77 @@
-"""Whether the certificates that a computer holds are good, and for how long: pure."""
+"""SHELL: whether the certificates that a computer holds are good, and the router trusts them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator
 from datetime import datetime
+from pathlib import Path
 from typing import Final
 
 from quadriga.shared.bus.diagnostics import BAD, GOOD, NOTE, Diagnosis
-from quadriga.shared.security.certificates import EXPIRED, NOT_YET_VALID, Certificate
-
-CERTIFICATE: Final = "certificate"
-CERTIFICATE_EARLY: Final = "certificate-not-yet-valid"
-CERTIFICATE_EXPIRED: Final = "certificate-expired"
-CERTIFICATE_EXPIRING: Final = "certificate-expiring"
-CERTIFICATE_UNTRUSTED: Final = "certificate-untrusted"
-CERTIFICATE_UNREADABLE: Final = "certificate-unreadable"
-KEY_OPEN: Final = "key-open"
+from quadriga.shared.bus.settings import NO_LINK, check_trust
+from quadriga.shared.config.endpoints import is_tls
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import ConfigError, QuadrigaError
+from quadriga.shared.security.access import team_identities
+from quadriga.shared.security.certificates import (
+    NOT_YET_VALID,
+    VALID,
+    is_signed,
+    read_certificate,
+    tls_files,
+)
 
 _SOON: Final = 7.0  # days: time to renew
-_OTHERS: Final = 0o077  # permissions of others than the owner
 
 
-@dataclass(frozen=True, slots=True)
-class HeldCertificate:
-    """What a computer holds of one identity.
-
-    Attributes:
-        identity: whose.
-        certificate: None: it cannot be read.
-        signed: whether the authority beside it has signed it.
-        key_mode: permissions of its private key; None: there is no key.
-        problem: why it cannot be read.
-    """
-
-    identity: str
-    certificate: Certificate | None
-    signed: bool = False
-    key_mode: int | None = None
-    problem: str = ""
-
-
-def check_certificates(held: Sequence[HeldCertificate], now: datetime) -> tuple[Diagnosis, ...]:
-    """All that is wrong with them, or one line that they are good.
-
-    Args:
-        held: by this computer.
-        now: by its clock.
-    """
-    found = tuple(item for each in held for item in _check(each, now))
-    days = [each.certificate.days_left(now) for each in held if each.certificate]
-    if found or not days:
-        return found
-    names = ", ".join(each.identity for each in held)
-    text = f"certificates of {names}: valid for {min(days):.0f} days at least"
-    return (Diagnosis(CERTIFICATE, GOOD, text),)
-
-
-def _check(held: HeldCertificate, now: datetime) -> Iterator[Diagnosis]:
-    name, certificate = held.identity, held.certificate
-    again = f"`quadriga certs renew {name}`, and copy its folder to its machine"
-    if held.key_mode is None:
-        text = f"there is no private key of {name}"
-        yield Diagnosis(CERTIFICATE_UNREADABLE, BAD, text, f"copy the whole folder {name}")
-    elif held.key_mode & _OTHERS:
-        text = f"others can read the private key of {name} (mode {held.key_mode:o})"
-        yield Diagnosis(KEY_OPEN, BAD, text, f"chmod 600 {name}/key.pem; renew it if it was read")
-    if certificate is None:
-        yield Diagnosis(CERTIFICATE_UNREADABLE, BAD, f"that of {name}: {held.problem}", again)
+def check_certificates(config: Config, now: datetime) -> Iterator[Diagnosis]:
+    """All that is wrong with those of a team that are here, or one line that they are good."""
+    if not is_tls(config.bus.endpoint):
         return
-    days = certificate.days_left(now)
-    if certificate.name != name:
-        text = f"the folder {name} has the certificate of {certificate.name}"
-        yield Diagnosis(CERTIFICATE_UNTRUSTED, BAD, text, f"copy the folder {name} again")
-    if not held.signed:
-        text = f"that of {name} is not signed by the authority whose certificate is beside it"
-        cause = "files of two teams, or of before `quadriga certs make` began anew: copy the folder"
-        yield Diagnosis(CERTIFICATE_UNTRUSTED, BAD, text, cause)
-    state = certificate.state(now)
-    if state == NOT_YET_VALID:
-        text = f"that of {name} is not valid before {certificate.begins:%F %T} UTC"
-        yield Diagnosis(CERTIFICATE_EARLY, BAD, text, "is the clock of this computer right?")
-    elif state == EXPIRED:
-        text = f"that of {name} expired {-days:.1f} days ago"
-        yield Diagnosis(CERTIFICATE_EXPIRED, BAD, text, again)
-    elif days < _SOON:
-        text = f"that of {name} expires in {days:.1f} days"
-        yield Diagnosis(CERTIFICATE_EXPIRING, NOTE, text, again)
+    folder, good = Path(config.bus.certificates), dict[str, float]()
+    for name in (who.name for who in team_identities(config)):
+        if not (folder / name).is_dir():
+            continue
+        again = f"`quadriga certs renew {name}`, and copy its folder to its machine"
+        try:
+            files = tls_files(config.bus.certificates, name)
+            certificate = read_certificate(files.certificate)
+            signed = is_signed(files.certificate, files.authority)
+        except ConfigError as error:
+            text = f"{error.name}: got {error.got}, expected {error.expected}"
+            yield Diagnosis("certificate-unusable", BAD, text, error.cause or again)
+            continue
+        state, days = certificate.state(now), certificate.days_left(now)
+        if not signed:
+            text = f"that of {name} is not signed by the authority whose certificate is beside it"
+            yield Diagnosis("certificate-untrusted", BAD, text, "files of two teams: copy it again")
+        elif state == NOT_YET_VALID:
+            text = f"that of {name} is not valid before {certificate.begins:%F %T} UTC"
+            remedy = "is the clock of this computer right?"
+            yield Diagnosis("certificate-not-yet-valid", BAD, text, remedy)
+        elif state != VALID:
+            text = f"that of {name} expired {-days:.1f} days ago"
+            yield Diagnosis("certificate-expired", BAD, text, again)
+        elif days < _SOON:
+            text = f"that of {name} expires in {days:.1f} days"
+            yield Diagnosis("certificate-expiring", NOTE, text, again)
+        else:
+            good[name] = days
+    if good:
+        text = f"of {', '.join(good)}: valid for {min(good.values()):.0f} days at least"
+        yield Diagnosis("certificate", GOOD, text)
+
+
+def try_certificate(config: Config, name: str) -> Iterator[Diagnosis]:
+    """Whether the router and the certificate of process `name` agree, if it is here."""
+    if not (is_tls(config.bus.endpoint) and (Path(config.bus.certificates) / name).is_dir()):
+        return
+    try:
+        check_trust(config.bus, name)
+    except QuadrigaError as error:
+        if NO_LINK not in error.got:  # the way there is another matter
+            code = "expired" if "expired" in error.got else "not-trusted"
+            yield Diagnosis(code, BAD, f"{error.name}: {error.got}", error.cause)
+    else:
+        text = "its certificate here and the router trust each other"
+        yield Diagnosis("trusted", GOOD, text)

@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final
 
+from quadriga.doctor.certificates import check_certificates, try_certificate
 from quadriga.doctor.machine import check_machine, need_of
 from quadriga.doctor.readings import read_machine
 from quadriga.doctor.report import DoctorReport, MemberReport
-from quadriga.doctor.trust import look_at_certificates, try_certificate
 from quadriga.shared.about import About
 from quadriga.shared.bus.diagnostics import (
     BAD,
-    DECISIVE,
-    DIFFERS,
     GOOD,
     NOTE,
     UNKNOWN,
@@ -29,9 +27,9 @@ from quadriga.shared.bus.session import HERE, Bus, pause
 from quadriga.shared.bus.settings import OPEN, REFUSED, UNTRIED, Reach, try_endpoint
 from quadriga.shared.config.endpoints import is_loopback, is_tls
 from quadriga.shared.config.sections import Config
-from quadriga.shared.errors import BusError, ConfigError
+from quadriga.shared.errors import ConfigError, QuadrigaError
 from quadriga.shared.members import DOCTOR, SIM, Member
-from quadriga.shared.runtime.clock import monotonic
+from quadriga.shared.runtime.clock import monotonic, utc_now
 from quadriga.shared.runtime.installed import project_version
 
 LINK: Final = "link"
@@ -51,15 +49,16 @@ def examine(config: Config, *, here: bool) -> DoctorReport:
     """
     endpoint, team = config.bus.endpoint, config.team.name
     need = need_of(config, spread=not is_loopback(endpoint))
-    machine = (*check_machine(read_machine(), need), *look_at_certificates(config))
+    machine = (*check_machine(read_machine(), need), *check_certificates(config, utc_now()))
     if here:
         link = _judge_reach(try_endpoint(endpoint), waiting=True)
         return DoctorReport(team, endpoint, project_version(), link, machine)
     me = describe_process(config, DOCTOR)
     view, link = _look_at_team(config, me)
-    differs = tuple(_own_differences(me, view))
     found = tuple(_report(member, view, config) for member in processes(config))
-    return DoctorReport(team, endpoint, me.version, link, (*differs, *machine), found)
+    return DoctorReport(
+        team, endpoint, me.version, link, (*disagreements(me, view), *machine), found
+    )
 
 
 def _report(member: Member, view: TeamView, config: Config) -> MemberReport:
@@ -74,21 +73,17 @@ def _look_at_team(config: Config, me: About) -> tuple[TeamView, Diagnosis]:
     """What is seen of a team without being one of it, and how it is reached."""
     nobody = frozenset[str]()
     view = TeamView(False, nobody, nobody, members(config))
-    if without := _lack_of_certificate(config):
-        return view, without
     try:
         bus = Bus.open(config.bus, config.team.name, DOCTOR)
-    except BusError as error:
-        if is_tls(config.bus.endpoint):  # a handshake has told why
+    except QuadrigaError as error:
+        if is_tls(config.bus.endpoint):  # no certificate, or a handshake has told why
             return view, Diagnosis(LINK, BAD, f"{error.name}: {error.got}", error.cause)
         reach = try_endpoint(config.bus.endpoint)
-        if reach.code == UNTRIED:
+        if reach.code == UNTRIED or isinstance(error, ConfigError):
             raise
         return view, _judge_reach(reach, waiting=False)
     with bus:
-        deadline = monotonic() + _LINK_TIMEOUT
-        while not bus.linked and monotonic() < deadline:
-            pause()
+        bus.wait_for_link(_LINK_TIMEOUT)
         deadline = monotonic() + _SETTLE
         while bus.linked and not members(config) <= bus.members_at(HERE):
             if monotonic() > deadline:
@@ -108,19 +103,6 @@ def _compare_clocks(bus: Bus, config: Config, view: TeamView) -> TeamView:
     alone = [name for name in plants if len(view.answers.get(name, ())) == 1]
     nearest = {name: [answer] for name in alone if (answer := ask_clock(bus, name)) is not None}
     return replace(view, answers={**view.answers, **nearest})
-
-
-def _lack_of_certificate(config: Config) -> Diagnosis | None:
-    """Why the doctor cannot be let in, if it has no certificate here."""
-    if not is_tls(config.bus.endpoint):
-        return None
-    from quadriga.shared.security.certificates import tls_files
-
-    try:
-        tls_files(config.bus.certificates, DOCTOR)
-    except ConfigError as error:
-        return Diagnosis(LINK, BAD, f"{error.name}: {error.got}", error.cause)
-    return None
 
 
 def _judge_reach(reach: Reach, *, waiting: bool) -> Diagnosis:
@@ -145,18 +127,3 @@ def _judge_reach(reach: Reach, *, waiting: bool) -> Diagnosis:
         return Diagnosis(LINK, GOOD, reach.text)
     text = f"{reach.text}, but there is no link"
     return Diagnosis(LINK, BAD, text, "another program, or with tls/ one side is not trusted")
-
-
-def _own_differences(me: About, view: TeamView) -> list[Diagnosis]:
-    """In what this computer differs from who drives time."""
-    if view.norm is None:
-        return []
-    return [
-        Diagnosis(
-            f"{DIFFERS}{item.of}",
-            BAD if item.of in DECISIVE else NOTE,
-            f"here {item.got}, {item.owner} has {item.wanted}",
-            "give the team's file with --config" if item.of == "configuration" else "",
-        )
-        for item in disagreements(me, view.norm)
-    ]

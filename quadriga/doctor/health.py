@@ -8,53 +8,33 @@ its certificate, with what it sees and has.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Final
 
 from quadriga.shared.about import READY
-from quadriga.shared.bus.diagnostics import BAD, CLOCK_OFF, NOT_REALTIME, TeamView, diagnose
+from quadriga.shared.bus.diagnostics import BAD, CLOCK_OFF, TeamView, diagnose
 from quadriga.shared.members import DOCTOR, ROUTER, Member
 
-WELL: Final = "well"  # how the line of who is healthy begins
-UNWELL: Final = "not well"
-# What the doctor finds bad and has nothing to do with hearing and trusting each other.
-_ELSE: Final = frozenset({CLOCK_OFF, NOT_REALTIME})
+WELL: Final = "well"
 
 
-@dataclass(frozen=True, slots=True)
-class Health:
-    """How one process is, in a word or two.
-
-    Attributes:
-        name: of the process.
-        reason: why it is not healthy; "": it is.
-    """
-
-    name: str
-    reason: str = ""
-
-    @property
-    def line(self) -> str:
-        """The same in one line, for programs and for people."""
-        return f"{UNWELL}: {self.reason}" if self.reason else WELL
-
-
-def judge_team(team: Sequence[Member], view: TeamView) -> tuple[Health, ...]:
-    """The health of all processes, of the router and of the doctor itself.
+def judge_team(team: Sequence[Member], view: TeamView) -> dict[str, str]:
+    """By name `WELL`, or in a line why not, of all processes, the router and the doctor itself.
 
     Args:
         team: the processes.
         view: what the doctor sees of them.
     """
-    link = "" if view.linked else "the doctor has no link to it"
-    found = (Health(member.name, _find_reason(member, view)) for member in team)
-    return (*found, Health(ROUTER, link), Health(DOCTOR))
+    reasons = {member.name: _find_reason(member, view) for member in team}
+    reasons[ROUTER] = "" if view.linked else "the doctor has no link to it"
+    found = {name: f"not well: {reason}" if reason else WELL for name, reason in reasons.items()}
+    return {**found, DOCTOR: WELL}
 
 
 def _find_reason(member: Member, view: TeamView) -> str:
     """Why a process is not healthy; "" if it is."""
     found = diagnose(member, view)
-    wrong = [item.text for item in found if item.verdict == BAD and item.code not in _ELSE]
+    # A clock has nothing to do with hearing and trusting each other.
+    wrong = [item.text for item in found if item.verdict == BAD and item.code != CLOCK_OFF]
     about = view.about(member.name)
     if wrong or about is None:
         return ", ".join(wrong)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from quadriga.doctor.packages import check_packages
+from packaging.requirements import InvalidRequirement, Requirement
+
 from quadriga.shared.bus.diagnostics import (
     BAD,
     CLOCK_LIMIT,
@@ -21,24 +22,16 @@ from quadriga.shared.bus.diagnostics import (
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import OPERATOR, RECORDER
 
-REALTIME: Final = "realtime"
-STALLS: Final = "stalls"
-GOVERNOR: Final = "governor"
-CORES: Final = "cores"
-MEMORY: Final = "memory"
-DISK: Final = "disk"
-CACHE: Final = "cache"
-CLOCK: Final = "clock"
-BUFFER: Final = "buffer"
-
 _PROCESS_BYTES: Final = 400_000_000  # of memory that a process takes, at most
 _ROBOT_BYTES: Final = 400_000  # recorded of a robot in a second of a walk, at most
 _LEAST_DISK: Final = 200_000_000  # bytes, for what else is written
+_PERMIT: Final = (
+    "`USER - rtprio 1` in /etc/security/limits.d, LimitRTPRIO=1 in a unit, or CAP_SYS_NICE"
+)
 _NO_STALLS: Final = (
     "leave a core idle; or, as root, `sysctl -w kernel.sched_rt_runtime_us=-1`, from Linux 6.12 on "
     "also write 0 into each /sys/kernel/debug/sched/fair_server/cpu*/runtime"
 )
-_FAST: Final = frozenset({"performance"})
 _BUSY: Final = 2  # processes of one robot that compute all the time: its agent and its plant
 _IDLE: Final = frozenset({OPERATOR, RECORDER})
 
@@ -107,7 +100,7 @@ def need_of(config: Config, *, spread: bool) -> MachineNeed:
     team = processes(config)
     busy = sum(member.role.name not in _IDLE for member in team)
     return MachineNeed(
-        realtime=config.world.mode == REALTIME,
+        realtime=config.world.mode == "realtime",
         spread=spread,
         busy=_BUSY if spread else busy,
         count=_BUSY if spread else len(team),
@@ -115,123 +108,111 @@ def need_of(config: Config, *, spread: bool) -> MachineNeed:
     )
 
 
-def check_machine(readings: MachineReadings, need: MachineNeed) -> tuple[Diagnosis, ...]:
+def check_machine(readings: MachineReadings, need: MachineNeed) -> Iterator[Diagnosis]:
     """All checks, one diagnosis each; what could not be read is unknown, never good."""
-    return (
-        check_realtime(readings.realtime, need),
-        check_stalls(readings.reserved, need),
-        check_governor(readings.governors, need),
-        check_cores(readings.cores, need),
-        check_memory(readings.memory, need),
-        check_disk(readings.disk, need),
-        check_cache(readings.cache_writable, readings.cache),
-        check_clock(readings.clock_error, need),
-        check_buffer(readings.receive_buffer, need),
-        check_packages(readings.requirements, readings.installed, readings.shadowing),
-    )
+    r, bad_in_realtime = readings, BAD if need.realtime else NOTE
+
+    def judge(code: str, good: bool, text: str, verdict: str, remedy: str) -> Diagnosis:
+        return Diagnosis(code, GOOD, text) if good else Diagnosis(code, verdict, text, remedy)
+
+    if r.realtime is None:
+        yield _unknown("realtime", "real-time scheduling")
+    else:  # in lock-step a walk needs none
+        text = f"real-time scheduling is {'' if r.realtime else 'not '}permitted"
+        yield judge("realtime", r.realtime, text, bad_in_realtime, _PERMIT)
+    if r.reserved is None:
+        yield _unknown("stalls", "how long the kernel stops real-time processes")
+    else:  # ordinary processes get their share of a second at once: a bridge stands still
+        ms = 1e3 * r.reserved
+        text = f"the kernel stops real-time processes for {ms:.0f} ms a second on a full core"
+        yield judge("stalls", not (ms and need.realtime), text, NOTE, _NO_STALLS)
+    if r.governors is None:
+        yield _unknown("governor", "the processor's governor")
+    else:  # a processor that sleeps between two ticks is late for the next one
+        text = f"the processor's governor is {', '.join(r.governors)}"
+        remedy = "sudo cpupower frequency-set -g performance"
+        yield judge("governor", {*r.governors} == {"performance"}, text, bad_in_realtime, remedy)
+    if r.cores is None:
+        yield _unknown("cores", "the number of cores")
+    else:
+        text = f"{r.cores:g} cores for {need.busy} processes that compute all the time"
+        remedy = "none is needed: in lock-step it only takes longer"
+        if need.realtime:
+            remedy = "spread the team over more computers, or walk in lock-step"
+        yield judge("cores", r.cores >= need.busy, text, bad_in_realtime, remedy)
+    if r.memory is None:
+        yield _unknown("memory", "free memory")
+    else:  # every process has libraries and compiled code of its own
+        wanted = need.count * _PROCESS_BYTES
+        text = f"{_format_bytes(r.memory)} of memory are free for {need.count} processes"
+        remedy = f"{_format_bytes(wanted)} are needed: end other programs"
+        yield judge("memory", r.memory >= wanted, text, BAD, remedy)
+    if r.disk is None:
+        yield _unknown("disk", "free space for runs")
+    else:
+        wanted, free = need.recorded + _LEAST_DISK, _format_bytes(r.disk)
+        text = f"{free} are free for runs, a walk takes up to {_format_bytes(wanted)}"
+        remedy = "delete old runs, or record elsewhere (--out, -o)"
+        yield judge("disk", r.disk >= wanted, text, BAD, remedy)
+    if r.cache_writable is None:
+        yield _unknown("cache", f"the cache folder {r.cache}")
+    else:  # what is not kept is compiled, collected and fitted again for each walk
+        can = "can" if r.cache_writable else "cannot"
+        text = f"the cache folder {r.cache} {can} be written to and has room"
+        remedy = "set XDG_CACHE_HOME to a folder of this user with room"
+        yield judge("cache", r.cache_writable, text, BAD, remedy)
+    if r.clock_error is None:
+        yield _unknown("clock", "how well the wall clock is kept")
+    else:  # recordings are read, certificates judged, and plants of single robots paced by it
+        text = f"the system clock is kept to {1e3 * r.clock_error:.3g} ms"
+        text = text if r.clock_error else "nobody keeps the system clock"
+        good = 0.0 < r.clock_error <= CLOCK_LIMIT
+        yield judge("clock", good, text, BAD if need.spread else NOTE, CLOCK_REMEDY)
+    if r.receive_buffer is None:
+        yield _unknown("buffer", "the room for what sockets receive")
+    else:  # what comes while a process waits for a core; in lock-step the sender waits
+        text = f"sockets may have room for {r.receive_buffer} bytes"
+        remedy = f"sudo sysctl -w net.core.rmem_max={RECEIVE_BUFFER}, or recordings may have gaps"
+        good = r.receive_buffer >= RECEIVE_BUFFER or not need.realtime
+        yield judge("buffer", good, text, NOTE, remedy)
+    yield check_packages(r.requirements, r.installed, r.shadowing)
 
 
-def check_realtime(permitted: bool | None, need: MachineNeed) -> Diagnosis:
-    """Real-time scheduling: in lock-step a walk needs none."""
-    if permitted is None:
-        return _unknown(REALTIME, "real-time scheduling")
-    if permitted:
-        return Diagnosis(REALTIME, GOOD, "real-time scheduling is permitted")
-    remedy = "`USER - rtprio 1` in /etc/security/limits.d, LimitRTPRIO=1 in a unit, or CAP_SYS_NICE"
-    text = "real-time scheduling is not permitted"
-    return Diagnosis(REALTIME, BAD if need.realtime else NOTE, text, remedy)
+def check_packages(
+    requirements: tuple[str, ...] | None,
+    installed: Mapping[str, str],
+    shadowing: Sequence[str] = (),
+) -> Diagnosis:
+    """Versions that are installed against those that are asked for.
 
-
-def check_stalls(reserved: float | None, need: MachineNeed) -> Diagnosis:
-    """Ordinary processes get their share of a second at once: a bridge stands still."""
-    if reserved is None:
-        return _unknown(STALLS, "how long the kernel stops real-time processes")
-    if not reserved:
-        return Diagnosis(STALLS, GOOD, "the kernel stops no real-time processes")
-    text = (
-        f"the kernel stops real-time processes for {1e3 * reserved:.0f} ms a second on a full core"
-    )
-    return Diagnosis(STALLS, NOTE if need.realtime else GOOD, text, _NO_STALLS * need.realtime)
-
-
-def check_governor(governors: tuple[str, ...] | None, need: MachineNeed) -> Diagnosis:
-    """A processor that sleeps between two ticks is late for the next one."""
-    if governors is None:
-        return _unknown(GOVERNOR, "the processor's governor")
-    text = f"the processor's governor is {', '.join(governors)}"
-    if _FAST.issuperset(governors):
-        return Diagnosis(GOVERNOR, GOOD, text)
-    remedy = "sudo cpupower frequency-set -g performance"
-    return Diagnosis(GOVERNOR, BAD if need.realtime else NOTE, text, remedy)
-
-
-def check_cores(cores: float | None, need: MachineNeed) -> Diagnosis:
-    """In real time each process that computes all the time needs a core of its own."""
-    if cores is None:
-        return _unknown(CORES, "the number of cores")
-    text = f"{cores:g} cores for {need.busy} processes that compute all the time"
-    if cores >= need.busy:
-        return Diagnosis(CORES, GOOD, text)
-    if not need.realtime:
-        return Diagnosis(CORES, NOTE, text, "none is needed: in lock-step it only takes longer")
-    remedy = "spread the team over more computers, or walk in lock-step"
-    return Diagnosis(CORES, BAD, text, remedy)
-
-
-def check_memory(free: int | None, need: MachineNeed) -> Diagnosis:
-    """Every process has libraries and compiled code of its own."""
-    if free is None:
-        return _unknown(MEMORY, "free memory")
-    text = f"{_format_bytes(free)} of memory are free for {need.count} processes"
-    if free >= need.count * _PROCESS_BYTES:
-        return Diagnosis(MEMORY, GOOD, text)
-    remedy = f"{_format_bytes(need.count * _PROCESS_BYTES)} are needed: end other programs"
-    return Diagnosis(MEMORY, BAD, text, remedy)
-
-
-def check_disk(free: int | None, need: MachineNeed) -> Diagnosis:
-    """A full disk ends a recording."""
-    if free is None:
-        return _unknown(DISK, "free space for runs")
-    wanted = need.recorded + _LEAST_DISK
-    text = f"{_format_bytes(free)} are free for runs, a walk takes up to {_format_bytes(wanted)}"
-    if free >= wanted:
-        return Diagnosis(DISK, GOOD, text)
-    return Diagnosis(DISK, BAD, text, "delete old runs, or record elsewhere (--out, -o)")
-
-
-def check_cache(writable: bool | None, folder: str) -> Diagnosis:
-    """What is not kept is compiled, collected and fitted again for each walk."""
-    if writable is None:
-        return _unknown(CACHE, f"the cache folder {folder}")
-    if writable:
-        return Diagnosis(CACHE, GOOD, f"the cache folder {folder} can be written to")
-    text = f"the cache folder {folder} cannot be written to, or its disk is full"
-    return Diagnosis(CACHE, BAD, text, "set XDG_CACHE_HOME to a folder of this user with room")
-
-
-def check_buffer(permitted: int | None, need: MachineNeed) -> Diagnosis:
-    """Room for what comes while a process waits for a core; in lock-step the sender waits."""
-    if permitted is None:
-        return _unknown(BUFFER, "the room for what sockets receive")
-    text = f"sockets may have room for {permitted} bytes"
-    if permitted >= RECEIVE_BUFFER:
-        return Diagnosis(BUFFER, GOOD, text)
-    remedy = f"sudo sysctl -w net.core.rmem_max={RECEIVE_BUFFER}, or recordings may have gaps"
-    return Diagnosis(BUFFER, NOTE if need.realtime else GOOD, text, remedy if need.realtime else "")
-
-
-def check_clock(error: float | None, need: MachineNeed) -> Diagnosis:
-    """Recordings are read, certificates judged, and plants of single robots paced by it."""
-    if error is None:
-        return _unknown(CLOCK, "how well the wall clock is kept")
-    if not error:
-        verdict = BAD if need.spread else NOTE
-        return Diagnosis(CLOCK, verdict, "nobody keeps the system clock", CLOCK_REMEDY)
-    text = f"the system clock is kept to {1e3 * error:.3g} ms"
-    if error <= CLOCK_LIMIT:
-        return Diagnosis(CLOCK, GOOD, text)
-    return Diagnosis(CLOCK, BAD if need.spread else NOTE, text, CLOCK_REMEDY)
+    Args:
+        requirements: such as `name>=1.0,<2`; None: not known.
+        installed: versions by name; what is not installed is not in it.
+        shadowing: files that are imported in the place of what is installed.
+    """
+    if shadowing:
+        text = f"imported in the place of what is installed: {', '.join(shadowing)}"
+        return Diagnosis("packages", BAD, text, "rename it, or take its folder out of PYTHONPATH")
+    if requirements is None:
+        text = "what this project asks for is not known: it is not installed"
+        return Diagnosis("packages", UNKNOWN, text)
+    wrong, unread = list[str](), list[str]()
+    for line in requirements:
+        try:
+            wanted = Requirement(line)
+            version = installed.get(wanted.name)
+            if version is None:
+                wrong.append(f"{wanted.name} is not installed")
+            elif not wanted.specifier.contains(version, prereleases=True):
+                wrong.append(f"{wanted.name} is {version}, not {wanted.specifier}")
+        except InvalidRequirement:
+            unread.append(line)
+    if wrong:
+        remedy = "pip install -c requirements.lock -e . in the project's folder"
+        return Diagnosis("packages", BAD, "; ".join(wrong), remedy)
+    if unread:
+        return Diagnosis("packages", UNKNOWN, f"{'; '.join(unread)}: not understood here")
+    return Diagnosis("packages", GOOD, f"{len(requirements)} packages are as asked for")
 
 
 def _unknown(code: str, what: str) -> Diagnosis:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import importlib.metadata
 import os
 import platform
@@ -12,11 +13,11 @@ from functools import partial
 from pathlib import Path
 from typing import Final, TypeVar
 
+from packaging.requirements import Requirement
+
 from quadriga.doctor.machine import MachineReadings
-from quadriga.doctor.packages import split_requirement
 from quadriga.shared.runtime.installed import PROJECT, shadowing_files
 from quadriga.shared.runtime.places import cache_dir
-from quadriga.shared.runtime.system_clock import system_clock_error_ns
 from quadriga.team.run_folder import RUNS
 
 T = TypeVar("T")
@@ -28,13 +29,16 @@ _FAIR: Final = Path("/sys/kernel/debug/sched/fair_server")
 _FAIR_DEFAULT: Final = 0.05  # s of each second
 _CGROUP: Final = Path("/sys/fs/cgroup")
 _UNLIMITED: Final = "max"
+# s; some daemons (phc2sys of linuxptp, systemd-timesyncd) tell the kernel of no error at all.
+_LEAST_ERROR: Final = 1e-4
+_UNSYNCHRONISED: Final = 0x0040  # STA_UNSYNC of <sys/timex.h>
 _CACHE_BYTES: Final = 200_000_000  # of machine code, and of data and predictors of some teams
 
 
 def read_machine() -> MachineReadings:
     """Look at this computer, as this user and in this folder; nothing is changed."""
     requirements = _read(_requirements)
-    names = [split_requirement(line)[0] for line in requirements or ()]
+    names = [Requirement(line).name for line in requirements or ()]
     versions = {name: _read(partial(importlib.metadata.version, name)) for name in names}
     return MachineReadings(
         realtime=_read(_may_take_realtime),
@@ -45,12 +49,40 @@ def read_machine() -> MachineReadings:
         disk=_read(lambda: shutil.disk_usage(_existing(RUNS)).free),
         cache=str(cache_dir()),
         cache_writable=_read(lambda: _has_room(_existing(cache_dir()))),
-        clock_error=_read(lambda: 1e-9 * system_clock_error_ns()),
+        clock_error=_read(_clock_error),
         receive_buffer=_read(lambda: int(_RECEIVE_BUFFER.read_text(encoding="ascii"))),
         requirements=requirements,
         installed={name: version for name, version in versions.items() if version},
         shadowing=shadowing_files(),
     )
+
+
+class Timex(ctypes.Structure):
+    """`struct timex` of <sys/timex.h>, on 64 bits."""
+
+    _fields_ = (
+        ("modes", ctypes.c_uint),  # 0: nothing is changed
+        ("offset_and_freq", ctypes.c_long * 2),
+        ("maxerror", ctypes.c_long),  # µs
+        ("esterror", ctypes.c_long),
+        ("status", ctypes.c_int),
+        ("rest", ctypes.c_long * 32),  # more than the kernel writes
+    )
+
+
+def _clock_error() -> float:
+    """How far the wall clock may be off, s, as a daemon of PTP or NTP has told the kernel.
+
+    0 if none keeps it. The kernel lets the error grow by 500 ppm between two corrections.
+    """
+    found = Timex()
+    if _adjtimex(found) < 0 or found.status & _UNSYNCHRONISED:
+        return 0.0
+    return max(1e-6 * int(found.maxerror), _LEAST_ERROR)
+
+
+def _adjtimex(found: Timex) -> int:
+    return int(ctypes.CDLL(None).adjtimex(ctypes.byref(found)))
 
 
 def _read(call: Callable[[], T]) -> T | None:

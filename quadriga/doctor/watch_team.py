@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Final
 
-from quadriga.doctor.health import Health, judge_team
+from quadriga.doctor.health import WELL, judge_team
 from quadriga.shared.bus.diagnostics import processes
 from quadriga.shared.bus.discovery import ask, describe_process, view_of
 from quadriga.shared.bus.session import POLL, READY, Bus
@@ -37,50 +37,28 @@ def watch_team(config: Config, folder: Path, stopped: Callable[[], bool] | None 
         ConfigError: the folder cannot be written to.
         BusError: the bus cannot be opened.
     """
-    stopped, files = stopped or stop_on_signals(), HealthFiles(folder)
-    files.write((Health(DOCTOR),))
+    stopped, files = stopped or stop_on_signals(), set[Path]()
+
+    def write(found: Mapping[str, str]) -> None:
+        """Write down what was found, by name."""
+        expected = "an existing folder that can be written to"
+        with name_file_errors(ConfigError, f"--watch {folder}", expected):
+            for name, line in found.items():
+                write_text(folder / name, f"{line}\n")
+                files.add(folder / name)
+
+    write({DOCTOR: WELL})
     try:
         with Bus.open(config.bus, config.team.name, DOCTOR, stopped) as bus:
-            _watch(bus, config, files, stopped)
+            me, team, end = describe_process(config, DOCTOR), processes(config), WalkEnd(bus)
+            while not (stopped() or end.is_over()):
+                due = monotonic() + EVERY
+                write(judge_team(team, view_of(bus, config, ask(bus), me)))
+                while monotonic() < due and not (stopped() or end.is_over()):
+                    sleep(POLL)
     finally:
-        files.remove()
-
-
-def _watch(bus: Bus, config: Config, files: HealthFiles, stopped: Callable[[], bool]) -> None:
-    me, team = describe_process(config, DOCTOR), processes(config)
-    end = WalkEnd(bus)
-    while not (stopped() or end.is_over()):
-        due = monotonic() + EVERY
-        view = view_of(bus, config, ask(bus), me)
-        files.write(judge_team(team, view))
-        while monotonic() < due and not (stopped() or end.is_over()):
-            sleep(POLL)
-
-
-class HealthFiles:
-    """A file for each process, there whole or not at all; none need outlive a crash."""
-
-    def __init__(self, folder: Path) -> None:
-        """Begin with none of them."""
-        self._folder, self._written = folder, set[Path]()
-
-    def write(self, found: tuple[Health, ...]) -> None:
-        """Write down what was found.
-
-        Raises:
-            ConfigError: the folder cannot be written to.
-        """
-        expected = "an existing folder that can be written to"
-        with name_file_errors(ConfigError, f"--watch {self._folder}", expected):
-            for health in found:
-                path = self._folder / health.name
-                write_text(path, f"{health.line}\n")
-                self._written.add(path)
-
-    def remove(self) -> None:
-        """Remove all of them."""
-        for path in self._written:
-            path.unlink(missing_ok=True)
+        for file in files:
+            file.unlink(missing_ok=True)
 
 
 class WalkEnd:

@@ -109,7 +109,7 @@ class FaultTeller:
             answers = self._bus.ask(f"{self._bus.team}/{RECORDER}/{RECEIVED}", _ASK_S)
             while not answers.over:
                 left.wait(_LOOK_S)
-            if answers.take():
+            if answers.came:
                 left.wait(_OPENS_S)
                 return
             left.wait(_LOOK_S)

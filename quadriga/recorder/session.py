@@ -61,7 +61,7 @@ class Session:
         self._ended = self._seen = self._announced = self._drops = False
         self._hurries = config.world.mode == "lockstep"  # then it does from the start
         self._passed_over = SkippedTicks(config)
-        self._losses = LossTimer(lambda: find_loss(bus, config))
+        self._losses = LossTimer(bus, config)
 
     def record(self, *, late: bool, seen: bool) -> None:
         """Record until the end; a late recorder reports what it has once it knows.

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
-from quadriga.doctor.health import Health, judge_team
+from quadriga.doctor.health import WELL, judge_team
 from quadriga.doctor.watch_team import WalkEnd
 from quadriga.shared.bus.diagnostics import TeamView, processes
 from quadriga.shared.bus.discovery import ask, describe_process, view_of
@@ -81,13 +81,18 @@ class TeamListener:
             view = view_of(bus, config, ask(bus), describe_process(config, OBSERVER))
             self._view = view
         here = bus.members_at(HERE)
-        health = {of.name: of for of in judge_team(self._team, view)}
+        health = judge_team(self._team, view)
         reading = self._fold.look(monotonic_ns())
+
+        def gone(name: str) -> bool:
+            """Whether a process has gone since all were asked."""
+            return name not in here and health[name] == WELL
+
         members = tuple(
             MemberStatus(
                 member.name,
                 member.name in here,
-                self._health_of(health[member.name], here=member.name in here),
+                "not well: gone" if gone(member.name) else health[member.name],
                 self._use_of(view, member.name),
                 reading.accounts.get(member.name),
             )
@@ -96,10 +101,6 @@ class TeamListener:
         problems = find_problems(config, bus.linked, reading, members)
         name, endpoint = config.team.name, config.bus.endpoint
         return TeamStatus(name, endpoint, bus.linked, reading, members, problems)
-
-    def _health_of(self, health: Health, *, here: bool) -> str:
-        """A process that has gone since all were asked is not well any more."""
-        return "not well: gone" if health.reason == "" and not here else health.line
 
     def _use_of(self, view: TeamView, name: str) -> MachineUse | None:
         about = view.about(name)
@@ -132,9 +133,7 @@ def listening(
     """
     with Bus.open(config.bus, config.team.name, f"{name}-{os.getpid()}", stopped) as bus:
         listener = TeamListener(config, bus, every_topic=every_topic)
-        until = monotonic() + _LINK_TIMEOUT
-        while not bus.linked and not stopped() and monotonic() < until:
-            sleep(_PAUSE)
+        bus.wait_for_link(_LINK_TIMEOUT, stopped)
         yield listener
 
 

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Final
 
 from quadriga.shared.bus.diagnostics import lead
 from quadriga.shared.bus.session import POLL, READY, Bus
-from quadriga.shared.bus.settings import link_settings
 from quadriga.shared.config.endpoints import is_tls
 from quadriga.shared.config.sections import Config
-from quadriga.shared.errors import ConfigError
 from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.runtime.scheduling import take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
@@ -21,12 +19,7 @@ _STAGES: Final = 3  # waits of the barrier: for the router, for everyone's prese
 
 
 def run(
-    config: Config,
-    listen: str,
-    *,
-    once: bool,
-    links: Sequence[str] = (),
-    stopped: Callable[[], bool] | None = None,
+    config: Config, listen: str, *, once: bool, stopped: Callable[[], bool] | None = None
 ) -> None:
     """Route until SIGINT or SIGTERM, or until one walk is over.
 
@@ -36,26 +29,19 @@ def run(
         config: the team's configuration.
         listen: the endpoint the others connect to.
         once: leave when the team of the configuration has walked and everyone has left.
-        links: endpoints of other routers that this one connects to, now or when they appear.
         stopped: asked often whether to stop; by default a flag that the two signals raise.
 
     Raises:
-        ConfigError: an endpoint is open to others, a certificate is missing, or routers are to be
-            linked that have certificates or leave after a walk.
+        ConfigError: the endpoint is open to others, or a certificate is missing.
         BusError: the endpoint cannot be opened; or, with `once`, the team did not assemble.
     """
-    if once and links:
-        cause = "linked routers would wait for each other to leave"
-        raise ConfigError("--once", "with --link", "one of the two", cause)
     stopped = stopped or stop_on_signals()
-    given = link_settings(config.bus, listen, links)
-    if is_tls(listen):
-        given |= router_rules(config)
-    with Bus.route(listen, config.team.name, config.bus, given) as bus:
+    rules = router_rules(config) if is_tls(listen) else {}
+    with Bus.route(listen, config.team.name, config.bus, rules) as bus:
         take_priority(config.runtime.priority)  # every command waits for it
         print(f"routing at {listen}", file=sys.stderr, flush=True)
         if once:
             timeout = _STAGES * config.bus.barrier_timeout
-            bus.wait_for(READY, [lead(config)], timeout, stopped, lambda: sleep(POLL))
+            bus.wait_for(READY, [lead(config)], timeout, stopped)
         while not stopped() and (bus.linked or not once):
             sleep(POLL)

@@ -86,9 +86,9 @@ class _Feed:
                 source.topic is MEASUREMENT and self.gatherer.has_truth
             )
             most = 1 if newest_only else _KEPT
-            fresh = source.newest.take(most)
+            messages, payloads = source.newest.take(most)
             tick, answered = -1, list[int]()
-            for payload in fresh.payloads:
+            for payload in payloads:
                 try:
                     message = decode(payload, source.topic.type)
                 except MessageError:
@@ -101,12 +101,12 @@ class _Feed:
                     self.gatherer.take(message, source.robot)
                 if isinstance(message, Status):
                     answered.append(len(message.tick_us))
-            self.traffic.note(source.name, fresh.messages, tick, now)
+            self.traffic.note(source.name, messages, tick, now)
             if source.topic is STATUS:
                 # An agent answers each state that it takes in with one command.
                 for topic in (STATE, COMMAND):
                     self.traffic.note_told(f"{source.robot}/{topic.name}", answered, now)
-            any_came |= fresh.messages > 0
+            any_came |= messages > 0
         return any_came
 
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
 from quadriga.shared.about import HERE, READY, STAGES, STARTED, WARMING_UP, About
-from quadriga.shared.about import REFUSED as NOT_GRANTED
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError
 from quadriga.shared.members import LEADS, PLANNER, SIM, Member, team_members
@@ -19,35 +18,22 @@ NOTE: Final = "note"  # worth knowing, and nothing is wrong
 BAD: Final = "bad"
 UNKNOWN: Final = "unknown"  # it could not be looked at
 
-NOT_STARTED: Final = "not-started"
-NO_LINK: Final = "no-link"
-NOT_ANSWERING: Final = "not-answering"
-FOREIGN: Final = "foreign"
-NOT_REACHABLE: Final = "not-reachable"
-UNREADABLE: Final = "unreadable"
-TWO_OF_A_NAME: Final = "two-of-a-name"
-NOT_SEEN: Final = "not-seen"
-DIFFERS: Final = "other-"  # and what: `other-configuration`
-CLOCK_OFF: Final = "clock-off"
-NOT_REALTIME: Final = "not-realtime"
-
 RECEIVE_BUFFER: Final = 4 << 20  # bytes, of each link's socket
+CLOCK_OFF: Final = "clock-off"
 CLOCK_LIMIT: Final = 0.1  # s, by which system clocks may differ: recordings are read by them
 PACE_LIMIT: Final = 1e-3  # s, by which those of plants may that pace their robots by them
 CLOCK_REMEDY: Final = "keep the clocks of all computers by PTP (ptp4l, phc2sys) or chrony"
 _PACED: Final = {"team.plant_per_robot=true", 'world.mode="realtime"'}  # of the configuration
-# In what processes may differ, in the order in which it is told, and what to do about it.
-REMEDIES: Final[Mapping[str, str]] = {
+# In what processes may differ, and what to do about it. No team walks with any but other code.
+_REMEDIES: Final = {
     "version": "install the same version of quadriga on all computers",
     "messages": "the versions are the same and the messages are not: install the same files",
     "configuration": "all processes of a team read the same file: copy it, give the same options",
     "predictor": "copy the predictor's file and name it with --predictor, or fit both by the same "
     "code",
     "code": "the versions are the same and the source files are not: update both",
-    "libraries": "the last digits of plans may differ; requirements.lock has the versions",
 }
-DECISIVE: Final = frozenset(("version", "messages", "configuration", "predictor"))
-_SHOWN: Final = 3  # keys or libraries that are named
+_SHOWN: Final = 3  # keys that are named
 _DIGITS: Final = 12  # of a digest
 _STAGES: Final = {
     STARTED: (NOTE, "on the bus, has not announced itself yet"),
@@ -107,13 +93,9 @@ class ClockOffset(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
-    """What came of one look at a process or a computer.
+    """What came of one look at a process or a computer, for programs and in words.
 
-    Attributes:
-        code: what was found or looked at, for programs.
-        verdict: `GOOD`, `NOTE`, `BAD` or `UNKNOWN`.
-        text: the same in words.
-        remedy: what to do about it; "": nothing.
+    `verdict` is `GOOD`, `NOTE`, `BAD` or `UNKNOWN`; `remedy` is what to do about it, if anything.
     """
 
     code: str
@@ -122,31 +104,11 @@ class Diagnosis:
     remedy: str = ""
 
 
-class TeamNorm(NamedTuple):
-    """What all must agree with: who drives the team's time, and the first process that plans."""
-
-    lead: About
-    predictor: str = ""  # its digest; "": unknown
-    planner: str = ""
-
-
-class Disagreement(NamedTuple):
-    """In what one process differs: a key of `REMEDIES`, what it has, and what the owner has."""
-
-    of: str
-    got: str
-    wanted: str
-    owner: str
-
-
 @dataclass(frozen=True, slots=True)
 class MemberAnswer:
-    """What one process has said of itself.
+    """What one process has said of itself, None if it cannot be read.
 
-    Attributes:
-        about: None: it cannot be read.
-        asked_ns: when it was asked, by the asker's wall clock.
-        arrived_ns: when the answer came, by the same clock.
+    When it was asked and when the answer came is by the asker's wall clock, ns.
     """
 
     about: About | None
@@ -172,7 +134,8 @@ class TeamView:
         doubled: names that two processes carry.
         names: all that the team should have.
         answers: what was said, by name; processes of one name answer each.
-        norm: what all must agree with; None: unknown.
+        lead: who drives the team's time, with which all must agree; None: it has said nothing.
+        planner: the first process that plans with a predictor, likewise.
     """
 
     linked: bool
@@ -180,7 +143,8 @@ class TeamView:
     doubled: frozenset[str]
     names: frozenset[str]
     answers: Mapping[str, Sequence[MemberAnswer]] = field(default_factory=dict)
-    norm: TeamNorm | None = None
+    lead: About | None = None
+    planner: About | None = None
 
     def abouts(self, name: str) -> list[About]:
         """What the processes of a name have said of themselves, as far as it can be read."""
@@ -197,11 +161,7 @@ def diagnose(member: Member, view: TeamView) -> tuple[Diagnosis, ...]:
     found = [*_two_of_a_name(member.name, view)]
     if about is None:
         return (*found, _explain_silence(member, view))
-    found += _explain_stage(about, view)
-    for item in disagreements(about, view.norm) if view.norm else ():
-        verdict = BAD if item.of in DECISIVE else NOTE
-        text = f"another {item.of}: {item.got}, {item.owner} has {item.wanted}"
-        found.append(Diagnosis(f"{DIFFERS}{item.of}", verdict, text, REMEDIES[item.of]))
+    found += [*_explain_stage(about, view), *disagreements(about, view)]
     return (*found, *_compare_clocks(member, view))
 
 
@@ -215,43 +175,48 @@ def describe_absent(absent: Collection[Member], view: TeamView) -> str:
     return "; ".join(f"{', '.join(names)}: {reason}" for reason, names in by_reason.items())
 
 
-def disagreements(process: About, norm: TeamNorm) -> tuple[Disagreement, ...]:
-    """In what a process differs from the others; of another version nothing else is compared."""
-    lead = norm.lead
+def disagreements(process: About, view: TeamView) -> Iterator[Diagnosis]:
+    """In what a process differs from who drives time; of another version nothing else is compared.
+
+    Predictors are compared with the first process that plans, where both have one.
+    """
+    lead, planner = view.lead, view.planner
+    if lead is None:
+        return
     if process.version != lead.version:
-        got, wanted = process.version or "not installed", lead.version or "not installed"
-        return (Disagreement("version", got, wanted, lead.name),)
-    found = list[Disagreement]()
+        yield _differs("version", process.version, lead, lead.version)
+        return
     own, its = _by_name(process.messages, " "), _by_name(lead.messages, " ")
     shared = own.keys() & its.keys()  # topics of a plug-in need not be known to all
     for of, mine, theirs in (
         ("messages", {n: own[n] for n in shared}, {n: its[n] for n in shared}),
         ("configuration", _by_name(process.config, "="), _by_name(lead.config, "=")),
-        ("libraries", _by_name(process.libraries, " "), _by_name(lead.libraries, " ")),
     ):
         names = [name for name in sorted({*mine, *theirs}) if mine.get(name) != theirs.get(name)]
         if names:
-            got, wanted = _name_values(names, mine), _name_values(names, theirs)
-            found.append(Disagreement(of, got, wanted, lead.name))
-    if process.predictor and norm.predictor and process.predictor != norm.predictor:
-        got, wanted = process.predictor[:_DIGITS], norm.predictor[:_DIGITS]
-        found.append(Disagreement("predictor", got, wanted, norm.planner))
+            yield _differs(of, _name_values(names, mine), lead, _name_values(names, theirs))
+    if planner and process.predictor and planner.predictor not in ("", process.predictor):
+        got, wanted = process.predictor[:_DIGITS], planner.predictor[:_DIGITS]
+        yield _differs("predictor", got, planner, wanted)
     if process.code != lead.code:
-        found.append(Disagreement("code", process.code, lead.code, lead.name))
-    return tuple(sorted(found, key=lambda item: list(REMEDIES).index(item.of)))
+        yield _differs("code", process.code, lead, lead.code)
 
 
-def refuse(name: str, team: str, found: Iterable[Disagreement]) -> None:
+def _differs(of: str, got: str, owner: About, wanted: str) -> Diagnosis:
+    text = f"another {of}: {got or 'none'}, {owner.name} has {wanted or 'none'}"
+    return Diagnosis(f"other-{of}", NOTE if of == "code" else BAD, text, _REMEDIES[of])
+
+
+def refuse(name: str, team: str, found: Iterable[Diagnosis]) -> None:
     """Refuse process `name` of a team if it differs in what no team walks with.
 
     Raises:
         BusError: it does; the message names what, for instance the keys of the configuration.
     """
     for item in found:
-        if item.of in DECISIVE:
-            expected = f"{item.wanted} as {item.owner} has it"
-            what = f"{item.of} of {name} in team {team!r}"
-            raise BusError(what, item.got, expected, REMEDIES[item.of])
+        if item.verdict == BAD:
+            expected = "the same in the whole team"
+            raise BusError(f"{name} of team {team!r}", item.text, expected, item.remedy)
 
 
 def _by_name(lines: Iterable[str], separator: str) -> dict[str, str]:
@@ -271,27 +236,27 @@ def _explain_silence(member: Member, view: TeamView) -> Diagnosis:
     if view.answers.get(name):
         text = "says what this version cannot read"
         cause = "another version of quadriga: install the same one"
-        return Diagnosis(UNREADABLE, BAD, text, cause)
+        return Diagnosis("unreadable", BAD, text, cause)
     if name in view.here:
         if member.foreign:
             text = "here, a controller of one's own that answers nothing"
-            return Diagnosis(FOREIGN, NOTE, text)
+            return Diagnosis("foreign", NOTE, text)
         cause = "frozen or overloaded, or an earlier version of quadriga: see its log, restart it"
-        return Diagnosis(NOT_ANSWERING, BAD, "here, but does not answer", cause)
+        return Diagnosis("not-answering", BAD, "here, but does not answer", cause)
     witnesses = sorted(
         other for other in view.answers if (said := view.about(other)) and name in said.sees
     )
     if witnesses:
         text = f"seen by {', '.join(witnesses)}, but not from here"
         cause = "frozen, or in peer mode its bus.listen cannot be reached from here"
-        return Diagnosis(NOT_REACHABLE, BAD, text, cause)
+        return Diagnosis("not-reachable", BAD, text, cause)
     if not view.linked:
-        return Diagnosis(NO_LINK, BAD, "no link to anyone")  # the way there is another matter
+        return Diagnosis("no-link", BAD, "no link to anyone")  # the way there is another matter
     text = "not on the bus: not started, failed, or another bus.endpoint or team.name"
     robot = f" --robot {member.robot}" if member.robot else ""
     real = ", of a real robot `bridge`" if member.role.name == SIM else ""
     command = f"`quadriga {member.role.command}{robot}`{real}"
-    return Diagnosis(NOT_STARTED, BAD, text, f"start it ({command}), or look at what it said")
+    return Diagnosis("not-started", BAD, text, f"start it ({command}), or look at what it said")
 
 
 def _two_of_a_name(name: str, view: TeamView) -> Iterator[Diagnosis]:
@@ -300,7 +265,7 @@ def _two_of_a_name(name: str, view: TeamView) -> Iterator[Diagnosis]:
     if name in view.doubled or len(announced) > 1:
         where = " and ".join(f"{about.host}:{about.pid}" for about in announced)
         text = f"two processes of this name{f', {where}' if len(announced) > 1 else ''}"
-        yield Diagnosis(TWO_OF_A_NAME, BAD, text, "stop one, or give one team another name")
+        yield Diagnosis("two-of-a-name", BAD, text, "stop one, or give one team another name")
 
 
 def _explain_stage(about: About, view: TeamView) -> Iterator[Diagnosis]:
@@ -312,17 +277,14 @@ def _explain_stage(about: About, view: TeamView) -> Iterator[Diagnosis]:
     unseen = sorted(missed & view.here)
     if about.stage != STARTED and unseen:
         cause = "in peer mode bus.listen of each must be reachable for all others; a firewall?"
-        yield Diagnosis(NOT_SEEN, BAD, f"does not see {', '.join(unseen)}", cause)
-    if about.scheduling == NOT_GRANTED:
-        cause = "permit it: LimitRTPRIO=1 in its unit, or rtprio 1 in /etc/security/limits.d"
-        yield Diagnosis(NOT_REALTIME, BAD, "has no real-time scheduling", cause)
+        yield Diagnosis("not-seen", BAD, f"does not see {', '.join(unseen)}", cause)
 
 
 def _compare_clocks(member: Member, view: TeamView) -> Iterator[Diagnosis]:
     """That its system clock is off: against this computer's, or by which plants pace robots."""
-    leader = view.norm.lead if view.norm else None
-    paces = member.role.name == SIM and leader is not None and _PACED.issubset(leader.config)
-    led = [said.clock_offset for said in view.answers.get(leader.name, ())] if leader else []
+    lead = view.lead
+    paces = member.role.name == SIM and lead is not None and _PACED.issubset(lead.config)
+    led = [said.clock_offset for said in view.answers.get(lead.name, ())] if lead else []
     for answer in view.answers[member.name]:
         if answer.clock_offset.exceeds(CLOCK_LIMIT):
             text = f"its system clock is {answer.clock_offset} this computer's"

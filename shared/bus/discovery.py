@@ -14,10 +14,9 @@ from collections.abc import Callable, Collection
 from dataclasses import replace
 from typing import Final
 
-from quadriga.shared.about import ABOUT, STAGES, STARTED, About, scheduling_of, stage_of
+from quadriga.shared.about import STAGES, STARTED, WARMING_UP, About, about_key
 from quadriga.shared.bus.diagnostics import (
     MemberAnswer,
-    TeamNorm,
     TeamView,
     describe_absent,
     disagreements,
@@ -27,27 +26,20 @@ from quadriga.shared.bus.diagnostics import (
     processes,
     refuse,
 )
-from quadriga.shared.bus.session import HERE, READY, Bus, pause
+from quadriga.shared.bus.session import HERE, READY, Bus, absence_error, pause
 from quadriga.shared.bus.settings import describe_way
 from quadriga.shared.codec import decode, encode
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import agreed_keys
 from quadriga.shared.errors import BusError, MessageError
-from quadriga.shared.members import LEADS, RECORDER, SIM, has_lead
+from quadriga.shared.members import LEADS, SIM, has_lead
 from quadriga.shared.runtime.clock import monotonic, wall_ns
-from quadriga.shared.runtime.installed import (
-    PROJECT,
-    code_digest,
-    package_versions,
-    project_version,
-)
-from quadriga.shared.runtime.scheduling import REALTIME, has_priority
+from quadriga.shared.runtime.installed import code_digest, project_version
 from quadriga.shared.schema import message_forms
 
 Pause = Callable[[], None]
 Answered = dict[str, list[MemberAnswer]]
 
-ALL: Final = ("*",)  # ask everybody
 _TIMEOUT: Final = 1.0  # s, for an answer: whoever is not frozen gives it within milliseconds
 _GRACE: Final = 0.5  # s more, after which nothing is awaited whatever the bus says
 _PATIENCE: Final = 3.0  # s, in which those that do not answer are asked again
@@ -76,22 +68,18 @@ class ProcessInfo:
     """
 
     def __init__(self, bus: Bus, config: Config, predictor_sha256: str = "") -> None:
-        self._bus = bus
-        # A recorder never asks for it; in lock-step nobody needs it.
-        paced = config.world.mode == "realtime" and bus.name != RECORDER
-        self._wanted = paced and config.runtime.priority == REALTIME
-        self._fixed = describe_process(config, bus.name, predictor_sha256)
+        self._bus, self._fixed = bus, describe_process(config, bus.name, predictor_sha256)
         self.met, self.start_ns = False, 0
-        bus.answer(ABOUT.key(bus.team, bus.name), lambda: encode(self.about))
+        bus.answer(about_key(bus.team, bus.name), lambda: encode(self.about))
 
     @property
     def about(self) -> About:
         """What this process says of itself now."""
-        stage = stage_of(self._bus.reached, met=self.met)
+        reached = self._bus.reached
+        stage = WARMING_UP if self.met else HERE if HERE in reached else STARTED
         return replace(
             self._fixed,
-            stage=stage,
-            scheduling=scheduling_of(wanted=self._wanted, granted=has_priority(), stage=stage),
+            stage=READY if READY in reached else stage,
             sees=tuple(sorted(self._bus.members_at(HERE))),
             wall_ns=wall_ns(),
             start_ns=self.start_ns,
@@ -100,7 +88,6 @@ class ProcessInfo:
 
 def describe_process(config: Config, name: str, predictor_sha256: str = "") -> About:
     """What does not change of what a process says of itself."""
-    versions, no_library = package_versions(), ("machine", PROJECT)
     return About(
         tick=0,
         stamp_ns=0,
@@ -109,50 +96,42 @@ def describe_process(config: Config, name: str, predictor_sha256: str = "") -> A
         pid=os.getpid(),
         version=project_version(),
         code=code_digest(),
-        libraries=tuple(f"{k} {v}" for k, v in versions.items() if k not in no_library),
         config=agreed_keys(config),
         messages=message_forms(),
         predictor=predictor_sha256,
         stage=STARTED,
-        scheduling=scheduling_of(wanted=False, granted=False, stage=STARTED),
         sees=(),
         wall_ns=0,
         start_ns=0,
     )
 
 
-def ask(bus: Bus, names: Collection[str] = ALL, wait: Pause = pause) -> Answered:
+def ask(bus: Bus, names: Collection[str] = ("*",), wait: Pause = pause) -> Answered:
     """What processes say of themselves, by name, once all have answered or a second has passed.
 
-    Args:
-        bus: where they are.
-        names: whom to ask.
-        wait: called all the time meanwhile; takes some milliseconds.
+    By default everybody is asked. Meanwhile `wait()` is called all the time, some ms each.
     """
-    questions = [bus.ask(ABOUT.key(bus.team, name), _TIMEOUT) for name in names]
+    questions = [bus.ask(about_key(bus.team, name), _TIMEOUT) for name in names]
     deadline = monotonic() + _TIMEOUT + _GRACE
     while not all(question.over for question in questions) and monotonic() < deadline:
         wait()
     answered: Answered = {}
     for question in questions:
-        for arrived_ns, key, payload in question.take():
+        for arrived_ns, key, payload in question.came:
             name = key.split("/")[1]
             answer = MemberAnswer(read_about(name, payload), question.asked_ns, arrived_ns)
             answered.setdefault(name, []).append(answer)
     return answered
 
 
-def ask_clock(bus: Bus, name: str, wait: Pause = pause) -> MemberAnswer | None:
+def ask_clock(bus: Bus, name: str) -> MemberAnswer | None:
     """Of some answers of a process that with the shortest round trip; None if it gives none.
 
-    Args:
-        bus: where it is.
-        name: whom to ask; of two processes of this name the nearer one answers.
-        wait: called all the time meanwhile; takes some milliseconds.
+    Of two processes of this name the nearer one answers.
     """
     received = list[MemberAnswer]()
     for _ in range(_CLOCK_ASKS):
-        new = [item for item in ask(bus, (name,), wait).get(name, ()) if item.about is not None]
+        new = [item for item in ask(bus, (name,)).get(name, ()) if item.about is not None]
         if not new:  # to ask one that is frozen takes a second
             break
         received += new
@@ -165,29 +144,22 @@ def read_about(name: str, payload: bytes) -> About | None:
         about = decode(payload, About)
     except MessageError:
         return None
-    texts = (about.host, about.version, about.code, about.predictor, *about.libraries)
-    plain = all(text.isprintable() for text in (*texts, *about.config, *about.sees))
+    texts = (about.host, about.version, about.code, about.predictor, *about.config, *about.sees)
+    plain = all(text.isprintable() for text in texts)
     return about if plain and about.name == name and about.stage in STAGES else None
 
 
 def view_of(
     bus: Bus, config: Config, answered: Answered, fallback: About | None = None
 ) -> TeamView:
-    """What a process sees of its team: who is on the bus, and what they have said.
+    """What a process sees of its team: who is on the bus, and what `ask` has given.
 
-    Args:
-        bus: its own.
-        config: the one it has.
-        answered: what `ask` has given.
-        fallback: with what all are compared where the process that drives time says nothing.
+    Where the process that drives time says nothing, all are compared with `fallback`.
     """
     linked = bus.linked or bus.name in LEADS  # to whom all others link
     view = TeamView(linked, bus.members_at(HERE), bus.duplicates(HERE), members(config), answered)
-    leader, planner = view.about(lead(config)) or fallback, first_predicting(config)
-    if leader is None:
-        return view
-    plans = view.about(planner)
-    return replace(view, norm=TeamNorm(leader, plans.predictor if plans else "", planner))
+    planner = view.about(first_predicting(config))
+    return replace(view, lead=view.about(lead(config)) or fallback, planner=planner)
 
 
 def join(
@@ -198,14 +170,8 @@ def join(
     A token is seen over the link its process uses for everything else, behind its subscriptions:
     whoever is seen will receive what is published from now on.
 
-    Args:
-        bus: this process's.
-        config: the team's configuration.
-        stopped: asked often whether to stop.
-        info: what this process says of itself; by default that it has no predictor.
-
-    Returns:
-        False if `stopped()` came first.
+    By default this process says of itself that it has no predictor. False if `stopped()` came
+    first.
 
     Raises:
         BusError: some did not come in time, the team walks already, has such a member already, or
@@ -228,7 +194,13 @@ def join(
         team, cause = f"team {bus.team!r} at {config.bus.endpoint}", "start the whole team again"
         raise BusError(team, "a team that walks already", "a network without this team", cause)
     _check_single(bus, config)
-    _check_oneself(bus, config, info.about)
+    # Whoever differs leaves by itself, so that the others can go on waiting for the right one.
+    # The process that drives time refuses later who does not answer.
+    others = {lead(config), first_predicting(config)} - {bus.name, ""}
+    found = [*disagreements(info.about, view_of(bus, config, ask(bus, sorted(others))))]
+    refuse(bus.name, bus.team, found)
+    for item in found:
+        log(f"{bus.name} has {item.text}: {item.remedy}")
     info.met = True
     return True
 
@@ -249,42 +221,30 @@ def await_members(
     Raises:
         BusError: some were not there in time; the message says why of each.
     """
-    due, logged = monotonic() + _QUIET, ""
-
-    def describe(absent: Collection[str]) -> tuple[str, bool]:
-        """Why some are not there, and whether this process is linked to anybody."""
-        view = view_of(bus, config, ask(bus, wait=wait), describe_process(config, bus.name))
-        awaited = [member for member in processes(config) if member.name in absent]
-        return describe_absent(awaited, view), view.linked
-
-    def wait_and_log() -> None:
-        nonlocal due, logged
+    begun, due, logged = monotonic(), monotonic() + _QUIET, ""
+    timeout, wanted = config.bus.barrier_timeout, frozenset(names) - {bus.name}
+    while absent := wanted - bus.members_at(stage):
+        if stopped():
+            return False
+        late = monotonic() > begun + timeout
+        if late or monotonic() > due:
+            view = view_of(bus, config, ask(bus, wait=wait), describe_process(config, bus.name))
+            reasons = describe_absent([m for m in processes(config) if m.name in absent], view)
+            if late:
+                # Only now: to try the way may take a second in which a robot is not attended.
+                way = "" if view.linked else f"; {describe_way(config.bus, bus.name)}"
+                raise absence_error(bus, stage, absent, wanted, timeout, reasons + way)
+            if reasons != logged:
+                log(f"{bus.name} waits; {reasons}")
+            due, logged = monotonic() + _EVERY, reasons
         wait()
-        if monotonic() < due:
-            return
-        absent = frozenset(names) - {bus.name} - bus.members_at(stage)
-        reasons = describe(absent)[0] if absent else logged
-        if reasons != logged:
-            log(f"{bus.name} waits; {reasons}")
-        due, logged = monotonic() + _EVERY, reasons
-
-    def explain(absent: Collection[str]) -> str:
-        """The same in one line; takes a second if one of those there is frozen."""
-        reasons, linked = describe(absent)
-        # Only now, at the end: to try it may take a second in which a robot would not be attended.
-        return reasons if linked else f"{reasons}; {describe_way(config.bus, bus.name)}"
-
-    timeout = config.bus.barrier_timeout
-    return bus.wait_for(stage, names, timeout, stopped, wait_and_log, explain)
+    return True
 
 
 def await_agents(bus: Bus, config: Config, stopped: Callable[[], bool]) -> bool:
     """A robot's wait until all but plants are ready: only then it stands up.
 
-    False if `stopped()` came first.
-
-    Raises:
-        BusError: some were not ready in time, or do not belong to this team.
+    False if `stopped()` came first; raises as `start_together`.
     """
     names = {member.name for member in processes(config) if member.role.name != SIM}
     if not await_members(bus, config, READY, names, stopped):
@@ -321,12 +281,6 @@ def check_others(bus: Bus, config: Config, names: Collection[str], wait: Pause =
 
     A controller of one's own need not say it; one that does must not differ.
 
-    Args:
-        bus: this process's, which drives time or is the plant of a robot.
-        config: its configuration.
-        names: the others.
-        wait: called all the time while they are asked.
-
     Raises:
         BusError: one differs, or gives no answer; the message names it and in what it differs.
     """
@@ -340,17 +294,16 @@ def check_others(bus: Bus, config: Config, names: Collection[str], wait: Pause =
         answered |= ask(bus, sorted(silent), wait)
     view = view_of(bus, config, answered, describe_process(config, bus.name))
     for name in others:
-        if name in foreign and name not in answered:
-            continue
         about = view.about(name)
-        if about is None or view.norm is None:
+        if about is not None:
+            refuse(name, bus.team, disagreements(about, view))
+        elif name not in foreign or name in answered:
             raise BusError(
                 f"{name} of team {bus.team!r}",
                 f"no answer that can be read within {_PATIENCE:g} s",
                 "its version and its configuration before the team walks",
                 "it is frozen or overloaded, or has another version of quadriga",
             )
-        refuse(name, bus.team, disagreements(about, view.norm))
 
 
 def _check_single(bus: Bus, config: Config) -> None:
@@ -361,18 +314,3 @@ def _check_single(bus: Bus, config: Config) -> None:
             "one of each name",
             "a second team with this team.name, or a process started twice",
         )
-
-
-def _check_oneself(bus: Bus, config: Config, about: About) -> None:
-    """Leave a team whose processes have something else in common.
-
-    Whoever differs leaves by itself, so that the others can go on waiting for the right one.
-    """
-    others = {lead(config), first_predicting(config)} - {bus.name, ""}
-    norm = view_of(bus, config, ask(bus, sorted(others))).norm
-    if norm is None:  # the process that drives time refuses later who does not answer
-        return
-    found = disagreements(about, norm)
-    refuse(bus.name, bus.team, found)
-    if any(item.of == "code" for item in found):
-        log(f"{norm.lead.name} has the same version of quadriga, but other source files")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from datetime import UTC, datetime
 from typing import Final, NamedTuple
 
@@ -47,8 +46,7 @@ def find_loss(bus: Bus, config: Config) -> Loss | None:
 def loss_error(loss: Loss, tick: int, missed_ns: int = 0, note: str = "") -> ProcessError:
     """The error of a process that ends because of a loss at a tick, ms.
 
-    `missed_ns` is when it was missed first, ns since 1970; 0: that is not known. `note` is what
-    the process has to say of itself, see `Standstill`.
+    `missed_ns` is when it was missed first, ns since 1970; 0: unknown. `note`: see `Standstill`.
     """
     cause = "killed, failed, or cut off: see what it says itself"
     if loss.code == LINK_LOST:
@@ -73,21 +71,17 @@ def missed_ns_of(line: str) -> int:
 class LossTimer:
     """Since when something is gone, and whether that is longer than `grace` seconds.
 
-    Args:
-        find: what is gone at the moment; None: nothing.
-        grace: s.
-
     Attributes:
         since: when the loss was seen first, s of the clock; None: there is none.
     """
 
-    def __init__(self, find: Callable[[], Loss | None], grace: float = 0.0) -> None:
-        self._find, self._grace = find, grace
+    def __init__(self, bus: Bus, config: Config, grace: float = 0.0) -> None:
+        self._bus, self._config, self._grace = bus, config, grace
         self.since: float | None = None
 
     def poll(self) -> Loss | None:
         """What is gone for good; None if all is there, or may be back."""
-        loss, now = self._find(), monotonic()
+        loss, now = find_loss(self._bus, self._config), monotonic()
         if loss is None:
             self.since = None
             return None
@@ -113,7 +107,7 @@ class Liveness:
     """
 
     def __init__(self, bus: Bus, config: Config) -> None:
-        self._timer = LossTimer(lambda: find_loss(bus, config), LAST_PACKETS)
+        self._timer = LossTimer(bus, config, LAST_PACKETS)
         self._bus, self._config = bus, config
         self._walks = False
         self._silent_since: float | None = None  # since the end was announced
@@ -131,10 +125,7 @@ class Liveness:
         return now - self._silent_since >= LAST_PACKETS or bool(find_loss(self._bus, self._config))
 
     def poll(self, tick: int) -> None:
-        """See whether the others are there; called while nothing arrives.
-
-        Args:
-            tick: the team's time as far as this process knows it, ms.
+        """See whether the others are there; called while nothing arrives, with the team's time, ms.
 
         Raises:
             ProcessError: who drives time, or the link to the router, is gone.

@@ -6,11 +6,10 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from threading import Lock
-from typing import Any, Final, Generic, NamedTuple, TypeVar
+from typing import Any, Generic, TypeVar
 
 from quadriga.shared.runtime.clock import monotonic
 
-INBOX: Final = 1 << 16  # packets that wait for a process at most, some seconds of ten robots
 Item = TypeVar("Item")
 
 
@@ -23,20 +22,17 @@ class Mailbox(Generic[Item]):
 
     Args:
         most: how many items wait at most: one more drops the oldest, so that who is too slow for
-            its senders does not fill the memory; 0: no limit.
+            its senders does not fill the memory.
 
     Attributes:
         dropped: how many items were dropped so.
     """
 
-    def __init__(self, most: int = 0) -> None:
+    def __init__(self, most: int) -> None:
         self.dropped = 0
-        self._items: deque[Item] = deque(maxlen=most or None)
+        self._items: deque[Item] = deque(maxlen=most)
         self._empty = Lock()  # released by `put`; whoever waits for an item acquires it
         self._empty.acquire()
-
-    def __len__(self) -> int:
-        return len(self._items)
 
     def put(self, item: Item) -> None:
         """Add an item, from any thread."""
@@ -63,16 +59,6 @@ class Mailbox(Generic[Item]):
         return [self._items.popleft() for _ in range(len(self._items))]
 
 
-class Fresh(NamedTuple):
-    """What has come since the last look: how many messages, and the newest of them, oldest first.
-
-    Fewer than were sent, where more came than are kept.
-    """
-
-    messages: int
-    payloads: list[bytes]
-
-
 class Newest:
     """The newest messages of a key, for whoever polls now and then and waits for none of them.
 
@@ -83,10 +69,13 @@ class Newest:
     def __init__(self, receive: Callable[[], Any]) -> None:
         self._receive = receive
 
-    def take(self, wanted: int) -> Fresh:
-        """What has come since this was called last, with at most `wanted` payloads."""
+    def take(self, wanted: int) -> tuple[int, list[bytes]]:
+        """How many came since this was called last, and at most `wanted` of them, the newest last.
+
+        Fewer than were sent, where more came than are kept.
+        """
         count, newest = 0, deque[Any](maxlen=wanted)
         while (sample := self._receive()) is not None:
             count += 1
             newest.append(sample)
-        return Fresh(count, [sample.payload.to_bytes() for sample in newest])
+        return count, [sample.payload.to_bytes() for sample in newest]

@@ -18,7 +18,7 @@ import zenoh
 
 from quadriga.shared.about import HERE as HERE
 from quadriga.shared.about import READY as READY
-from quadriga.shared.bus.ring_buffer import INBOX, Mailbox, Newest
+from quadriga.shared.bus.ring_buffer import Mailbox, Newest
 from quadriga.shared.bus.settings import (
     NO_LINK,
     check_trust,
@@ -37,6 +37,7 @@ Packet = tuple[str, bytes]  # key, payload as received
 Arrival = tuple[int, str, bytes]  # when, ns of `monotonic_ns`, and the packet
 Answer = tuple[int, str, bytes]  # when, ns of the wall clock, and key and payload
 
+_INBOX: Final = 1 << 16  # packets that wait for a process at most, some seconds of ten robots
 POLL: Final = 0.05  # s, longest wait before a loop looks at its stop flag
 _ACK_TIMEOUT: Final = 2.0  # s
 _LINK_TIMEOUT: Final = 5.0  # s
@@ -53,29 +54,25 @@ def pause() -> None:
 
 
 class Answers:
-    """The answers to one question; a thread that receives them fills it, another one reads it.
+    """The answers to one question; a thread that receives them adds to it, another one reads it.
 
     Attributes:
         asked_ns: when the question was asked, by the wall clock.
         over: whether nothing more will come: all who can answer have, or the time is over.
+        came: what has come, oldest first.
     """
 
     def __init__(self) -> None:
-        self.asked_ns, self.over = wall_ns(), False
-        self._answers: SimpleQueue[Answer] = SimpleQueue()
+        self.asked_ns, self.over, self.came = wall_ns(), False, list[Answer]()
 
     def note(self, reply: zenoh.Reply) -> None:
         """An answer has come."""
         if reply.ok is not None:
-            self._answers.put((wall_ns(), *_packet(reply.ok)))
+            self.came.append((wall_ns(), *_packet(reply.ok)))
 
     def end(self) -> None:
         """Nothing more will come."""
         self.over = True
-
-    def take(self) -> list[Answer]:
-        """All that has come since this was called last, oldest first."""
-        return [self._answers.get_nowait() for _ in range(self._answers.qsize())]
 
 
 class Bus:
@@ -85,6 +82,10 @@ class Bus:
     token `<team>/<name>/<stage>/<session>`: it vanishes within milliseconds when its process dies,
     and the session in it tells two processes of the same name apart. A process's last packets may
     arrive after its token has vanished.
+
+    Attributes:
+        oversized: payloads that were dropped because of their size so far.
+        standstill: how long this process has not run.
     """
 
     def __init__(self, session: zenoh.Session, team: str, name: str) -> None:
@@ -92,11 +93,10 @@ class Bus:
         self.team, self.name = team, name
         self._session = session
         self._me = str(session.info.zid())
-        self._inbox: Mailbox[zenoh.Sample] = Mailbox(INBOX)
-        self._oversized: SimpleQueue[None] = SimpleQueue()  # counts what several threads drop
+        self._inbox: Mailbox[zenoh.Sample] = Mailbox(_INBOX)
         self._tokens: set[tuple[str, str, str]] = set()  # of others: name, stage, session
         self._declared: dict[str, zenoh.LivelinessToken] = {}
-        self._closed, self.standstill = False, Standstill()
+        self._closed, self.oversized, self.standstill = False, 0, Standstill()
         tokens, ack = f"{team}/*/*/*", f"{team}/{name}/{RECEIVED}"
         # Zenoh drops publishers and subscribers nobody refers to.
         self._declarations: list[Any] = [
@@ -145,18 +145,13 @@ class Bus:
         """Join the network at `bus.endpoint`; in peer mode be who listens there if nobody does.
 
         For a process that must be found although no plant runs. If somebody listens there,
-        this waits for the link to them.
-
-        Raises:
-            BusError: the endpoint is malformed, or in client mode there is no router.
+        this waits for the link to them. It raises what `open` does.
         """
         if bus.mode == "peer":
             with suppress(BusError):  # somebody listens there, or it is another machine's
                 return cls(_open(member_settings(bus, name, hub=True), name), team, name)
         joined = cls.open(bus, team, name)
-        deadline = monotonic() + _LINK_TIMEOUT
-        while not joined.linked and monotonic() < deadline:
-            pause()
+        joined.wait_for_link(_LINK_TIMEOUT)
         return joined
 
     @classmethod
@@ -169,17 +164,8 @@ class Bus:
     ) -> Self:
         """Be the router through which the processes in client mode reach each other.
 
-        It passes on what any team sends, and sees the presence of `team`.
-
-        Args:
-            listen: the endpoint they connect to; `tls/0.0.0.0:PORT` accepts other machines.
-            team: the team to look at.
-            bus: the configuration, for its certificates.
-            rules: what it lets through; by default everything.
-
-        Raises:
-            ConfigError: the endpoint is open to others, or a certificate is missing.
-            BusError: the endpoint is malformed, cannot be bound, or is already in use.
+        It passes on what any team sends, by default everything, and sees the presence of `team`.
+        `tls/0.0.0.0:PORT` accepts other machines. It raises what `open` does.
         """
         settings = router_settings(listen, bus or BusConfig(), rules)
         return cls(_open(settings, ROUTER), team, ROUTER)
@@ -188,6 +174,12 @@ class Bus:
     def linked(self) -> bool:
         """Whether anyone is linked to this process at the moment."""
         return bool(self._session.info.links())
+
+    def wait_for_link(self, timeout: float, stopped: Callable[[], bool] = lambda: False) -> None:
+        """Wait until anyone is linked, for `timeout` seconds at most, or until `stopped()`."""
+        deadline = monotonic() + timeout
+        while not (self.linked or stopped()) and monotonic() < deadline:
+            pause()
 
     def publisher(
         self, key: str, *, droppable: bool = False, urgent: bool = False
@@ -198,7 +190,7 @@ class Bus:
 
         Args:
             key: the full key, `<team>/…`.
-            droppable: when a receiver is slow, drop (real time) instead of waiting for it.
+            droppable: drop when a receiver is slow (real time) instead of waiting for it.
             urgent: overtake all else and never wait; dropped only where nothing goes through.
         """
         control = zenoh.CongestionControl
@@ -221,16 +213,11 @@ class Bus:
 
         def put(sample: zenoh.Sample) -> None:
             if len(sample.payload) > largest:
-                self._oversized.put(None)
+                self.oversized += 1  # by one thread, see `_ONE_RECEIVES`
             else:
                 self._inbox.put(sample)
 
         self._hear(key, _direct(put if largest else self._inbox.put))
-
-    @property
-    def oversized(self) -> int:
-        """Payloads that were dropped because of their size so far."""
-        return self._oversized.qsize()
 
     @property
     def dropped(self) -> int:
@@ -314,18 +301,9 @@ class Bus:
         return frozenset(name for name, count in counts.items() if count > 1)
 
     def wait_for(
-        self,
-        stage: str,
-        names: Iterable[str],
-        timeout: float,
-        stopped: Callable[[], bool],
-        wait: Callable[[], None] = pause,
-        explain: Callable[[frozenset[str]], str] | None = None,
+        self, stage: str, names: Iterable[str], timeout: float, stopped: Callable[[], bool]
     ) -> bool:
         """Wait until all `names` are at `stage`; False if `stopped()` came first.
-
-        Between two looks `wait()` is called, which takes some milliseconds. `explain()` tells at
-        the end why some are absent.
 
         Raises:
             BusError: some were still absent after `timeout` seconds; the message names them.
@@ -336,13 +314,9 @@ class Bus:
             if stopped():
                 return False
             if monotonic() > deadline:
-                raise BusError(
-                    f"barrier of team {self.team!r}, seen by {self.name}",
-                    f"no {', '.join(sorted(absent))} at stage {stage!r} after {timeout:g} s",
-                    f"{', '.join(sorted(wanted))}",
-                    explain(absent) if explain else "not started, or at another endpoint or team",
-                )
-            wait()
+                cause = "not started, or at another endpoint or team"
+                raise absence_error(self, stage, absent, wanted, timeout, cause)
+            pause()
         return True
 
     def close(self) -> None:
@@ -397,6 +371,18 @@ class Bus:
             return
         there = sample.kind == zenoh.SampleKind.PUT
         (self._tokens.add if there else self._tokens.discard)((name, stage, session))
+
+
+def absence_error(
+    bus: Bus, stage: str, absent: Iterable[str], wanted: Iterable[str], after: float, cause: str
+) -> BusError:
+    """The error of who has waited for others for so many seconds."""
+    return BusError(
+        f"barrier of team {bus.team!r}, seen by {bus.name}",
+        f"no {', '.join(sorted(absent))} at stage {stage!r} after {after:g} s",
+        f"{', '.join(sorted(wanted))}",
+        cause,
+    )
 
 
 def _packet(sample: zenoh.Sample) -> Packet:

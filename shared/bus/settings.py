@@ -4,15 +4,22 @@ from __future__ import annotations
 
 import re
 import socket
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
 from quadriga.shared.bus.diagnostics import RECEIVE_BUFFER
 from quadriga.shared.config.endpoints import check_exposure, check_port, host_and_port, is_tls
 from quadriga.shared.config.sections import BusConfig
-from quadriga.shared.errors import BusError, ConfigError, QuadrigaError
+from quadriga.shared.errors import (
+    BusError,
+    ConfigError,
+    QuadrigaError,
+    name_file_errors,
+    system_reason,
+)
 from quadriga.shared.members import LEADS, ROUTER
+from quadriga.shared.runtime.clock import utc_now
 
 NO_LINK: Final = "Unable to connect"  # how Zenoh says that nobody answers at an endpoint
 LEASE_MS: Final = 10_000  # of silence after which a link is given up: its process stands still
@@ -42,21 +49,30 @@ _COMMON: Final = {
 }
 
 OPEN: Final = "open"  # something listens there
-REFUSED: Final = "refused"
+REFUSED: Final = "refused"  # the connection, or our certificate
 SILENT: Final = "silent"
 UNRESOLVED: Final = "unresolved"
 UNREACHABLE: Final = "unreachable"
 UNTRIED: Final = "untried"
 _TIMEOUT: Final = 1.0  # s
+_HANDSHAKE_TIMEOUT: Final = 2.0  # s, for the connection and for each answer
+_VERDICT: Final = 0.3  # s, in which a listener that does not accept our certificate says so
+_UNTRUSTED: Final = "untrusted"  # its certificate is another authority's, or for another address
+_DATES: Final = {9: "not yet valid", 10: "expired"}  # by OpenSSL's codes
+_CAUSES: Final = {
+    NO_LINK: "is the router there (`quadriga router`), and does the name resolve?",
+    "expired": "`quadriga certs renew router`, or a clock that is wrong",
+    "not yet valid": "a clock that is wrong, here or where it was made",
+    _UNTRUSTED: "another authority's, or the router was not made for this address: "
+    "`quadriga certs make --router HOST`",
+    REFUSED: "ours has expired or is another authority's: `quadriga certs show`",
+}
 
 
 def member_settings(bus: BusConfig, name: str, *, hub: bool = False) -> dict[str, Any]:
     """Zenoh's settings of a process of the team; only the configured endpoints are opened.
 
-    Args:
-        bus: the configuration.
-        name: of the process; in peer mode the one that drives time is who they all find.
-        hub: be who they find although the name is another.
+    In peer mode the process that drives time is who they all find, or who is the `hub`.
 
     Raises:
         ConfigError: the endpoint is open to others, or a certificate is missing.
@@ -81,12 +97,7 @@ def member_settings(bus: BusConfig, name: str, *, hub: bool = False) -> dict[str
 
 
 def router_settings(listen: str, bus: BusConfig, rules: Mapping[str, Any]) -> dict[str, Any]:
-    """Zenoh's settings of the router that clients connect to at endpoint `listen`.
-
-    Args:
-        listen: where it listens.
-        bus: the configuration.
-        rules: what it lets through, as Zenoh is told it.
+    """Zenoh's settings of the router that clients connect to at `listen`, by its rules of access.
 
     Raises:
         ConfigError: the endpoint is open to others, or a certificate is missing.
@@ -104,23 +115,6 @@ def router_settings(listen: str, bus: BusConfig, rules: Mapping[str, Any]) -> di
     }
 
 
-def link_settings(bus: BusConfig, listen: str, links: Sequence[str]) -> dict[str, Any]:
-    """What a router that listens at `listen` is told besides of those at the endpoints `links`.
-
-    Raises:
-        ConfigError: one is open to others, or there are certificates: whoever is linked as a router
-            speaks for everybody behind it, so one stolen certificate would command all robots.
-    """
-    for endpoint in links:
-        check_exposure(replace(bus, mode="client"), "--link", endpoint)
-        if is_tls(endpoint) or is_tls(listen):
-            expected = "one router for all of a team with certificates"
-            cause = "the rules are for each process, and a router speaks for all behind it"
-            raise ConfigError("--link", f"{endpoint!r} of a router at {listen}", expected, cause)
-    retry = {"connect/exit_on_failure": False, "connect/timeout_ms": -1, "connect/retry": _RETRY}
-    return {"connect/endpoints": list(links), **retry} if links else {}
-
-
 def _certificates(bus: BusConfig, endpoint: str, name: str, *, listens: bool) -> Mapping[str, Any]:
     if not is_tls(endpoint):
         return {}
@@ -130,13 +124,9 @@ def _certificates(bus: BusConfig, endpoint: str, name: str, *, listens: bool) ->
 
 
 def opening_error(settings: dict[str, Any], at: str, name: str, error: str) -> BusError:
-    """The error of a process `name` that cannot join the network.
+    """The error of a process `name` that cannot join the network, out of Zenoh's words.
 
-    Args:
-        settings: all of Zenoh's.
-        at: the last of them that was set; Zenoh often does not say which one is wrong.
-        name: the process.
-        error: Zenoh's words.
+    Zenoh often does not say which setting is wrong: `at` is the last that was set.
     """
     connect, listen = settings["connect/endpoints"], settings["listen/endpoints"]
     key, endpoint = "bus.endpoint", (connect or listen)[0]
@@ -191,9 +181,9 @@ def try_endpoint(endpoint: str, timeout: float = _TIMEOUT) -> Reach:
 
 
 def check_trust(bus: BusConfig, name: str) -> None:
-    """Whether process `name` and the router trust each other, if they ask for it.
+    """Whether process `name` and the router trust each other, if they ask for it: tried once.
 
-    Zenoh takes who is not trusted for one that is not there yet.
+    Zenoh takes who is not trusted for one that is not there yet, and tries for ever.
 
     Raises:
         BusError: nobody answers, or one does not trust the other; it says who and why.
@@ -201,18 +191,47 @@ def check_trust(bus: BusConfig, name: str) -> None:
     """
     if not is_tls(bus.endpoint):
         return
-    from quadriga.shared.security import handshake
-    from quadriga.shared.security.certificates import tls_files
+    import ssl
 
-    found = handshake.shake_hands(bus.endpoint, tls_files(bus.certificates, name))
-    if found.outcome != handshake.TRUSTED:
-        got = NO_LINK if found.outcome == handshake.UNREACHABLE else found.outcome
-        raise BusError(
-            f"bus.endpoint {bus.endpoint!r} of {name}",
-            f"{got}: {found.detail}",
-            "a router that is trusted and trusts this process",
-            handshake.CAUSES[found.outcome],
-        )
+    from quadriga.shared.security.certificates import NOT_YET_VALID, read_certificate, tls_files
+
+    def error(outcome: str, detail: str) -> BusError:
+        where, expected = f"bus.endpoint {bus.endpoint!r} of {name}", "a router that is trusted and"
+        got, cause = f"{outcome}: {detail}", _CAUSES[outcome]
+        return BusError(where, got, f"{expected} trusts this process", cause)
+
+    host, port = host_and_port(bus.endpoint)
+    files, context = tls_files(bus.certificates, name), ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    folder, expected = files.certificate.parent, "a certificate, its key, the authority's"
+    with name_file_errors(ConfigError, folder, expected, "`quadriga certs show`"):
+        context.load_verify_locations(files.authority)
+        context.load_cert_chain(files.certificate, files.key)
+    held, now = read_certificate(files.certificate), utc_now()
+    if held.state(now) == NOT_YET_VALID:  # the other side would say that it has expired
+        raise error(NOT_YET_VALID, f"ours is from {held.begins:%F %T} on, now is {now:%F %T}")
+    try:
+        with (
+            socket.create_connection((host, port), _HANDSHAKE_TIMEOUT) as link,
+            context.wrap_socket(link, server_hostname=host) as secured,
+        ):
+            # Who does not accept our certificate says so after the handshake; silence is consent.
+            secured.settimeout(_VERDICT)
+            try:
+                hung_up = not secured.recv(1)
+            except TimeoutError:
+                return
+        if hung_up:
+            raise error(REFUSED, "it hung up")
+    except ssl.SSLCertVerificationError as problem:
+        outcome = _DATES.get(problem.verify_code, _UNTRUSTED)
+        raise error(outcome, problem.verify_message) from None
+    except ssl.SSLError as problem:
+        text = problem.reason or str(problem)
+        raise error(REFUSED, text.lower().replace("_", " ")) from None
+    except ConnectionResetError:
+        raise error(REFUSED, "it hung up") from None
+    except OSError as problem:
+        raise error(NO_LINK, system_reason(problem)) from None
 
 
 def describe_way(bus: BusConfig, name: str) -> str:

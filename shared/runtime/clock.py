@@ -31,18 +31,17 @@ def wall_ns() -> int:
     return time.time_ns()
 
 
-def wall_offset() -> tuple[int, int]:
-    """The system clock minus the monotonic one, and how far that may be off, ns.
+def wall_offset_ns() -> int:
+    """The system clock minus the monotonic one; of three readings the least interrupted counts.
 
-    Of three readings that counts which was interrupted least. On Linux it changes only when
-    somebody sets the system clock: what PTP or NTP does to its rate both clocks follow.
+    On Linux it changes only when somebody sets the system clock: what PTP or NTP does to its rate
+    both clocks follow.
     """
     readings = list[tuple[int, int]]()
     for _ in range(3):
         before, wall, after = time.monotonic_ns(), time.time_ns(), time.monotonic_ns()
         readings.append((after - before, wall - (before + after) // 2))
-    apart, offset = min(readings)
-    return offset, apart // 2 + 1
+    return min(readings)[1]
 
 
 def format_local(form: str, ns: int) -> str:
@@ -82,8 +81,7 @@ class Rate:
         slack: float = 20.0,
     ) -> None:
         self._period, self._now, self._pause, self._slack = period, now, pause, slack
-        self._next = now()
-        self.overruns, self.lost = 0, 0.0
+        self._next, self.overruns, self.lost = now(), 0, 0.0
 
     def wait(self) -> float:
         """Wait for the next turn and return how late it begins, in seconds."""
@@ -92,8 +90,7 @@ class Rate:
         if ahead > 0.0:
             self._pause(ahead)
         late = max(self._now() - self._next, 0.0)
-        if late > self._period:
-            self.overruns += 1
+        self.overruns += late > self._period
         if late > self._slack * self._period:
             now = self._now()
             self.lost += now - self._next

@@ -42,22 +42,16 @@ def make_runtime_dir() -> Path | None:
     with suppress(OSError):
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         about = folder.lstat()  # not of what a link points to
-        if stat.S_ISDIR(about.st_mode) and is_private(about):
+        private = about.st_uid == os.getuid() and not about.st_mode & _OF_OTHERS
+        if stat.S_ISDIR(about.st_mode) and private:
             return folder
     return None
 
 
-def is_private(about: os.stat_result) -> bool:
-    """Whether a file or folder is this user's, and closed to all others."""
-    return about.st_uid == os.getuid() and not about.st_mode & _OF_OTHERS
-
-
 def cache_file(kind: str, key: str) -> Path:
-    """The file of the cache that holds what `key` stands for, a digest of all it depends on.
+    """The file of the cache, of a kind such as `data`, that holds what `key` stands for.
 
-    Args:
-        kind: what it is: `predictor`, `data`.
-        key: of one file of this kind.
+    The key is a digest of all that it depends on.
     """
     return cache_dir() / f"{kind}-{key}.npz"
 

@@ -55,10 +55,7 @@ def precede_ordinary(priority: str) -> None:
     """Give all threads of this process more of the processors than other ordinary ones get.
 
     For who must neither hold up those that walk nor starve because others compute: the recorder
-    in real time. A user without the right (CAP_SYS_NICE) is not refused.
-
-    Args:
-        priority: as of `take_priority`; only `REALTIME` has an effect.
+    in real time. Only `REALTIME` has an effect, and only if the user has the right.
     """
     if valid_priority(priority) == REALTIME:
         for thread in _threads():
@@ -77,11 +74,7 @@ def leave_priority() -> None:
 
 @contextmanager
 def at_work(priority: str) -> Iterator[None]:
-    """Within the block, this process has priority: see `take_priority`, `leave_priority`.
-
-    Raises:
-        ConfigError: the environment's priority is none.
-    """
+    """Within the block, this process has priority: see `take_priority`, `leave_priority`."""
     take_priority(priority)
     try:
         yield
@@ -89,16 +82,10 @@ def at_work(priority: str) -> Iterator[None]:
         leave_priority()
 
 
-def has_priority() -> bool:
-    """Whether this process is scheduled in real time."""
-    return os.sched_getscheduler(os.getpid()) in (os.SCHED_RR, os.SCHED_FIFO)
-
-
 def go_first(*, alone: bool = False) -> None:
     """Schedule this process before those that walk, if the user may do so: it is to stop them.
 
-    Args:
-        alone: what it starts from now on is ordinary.
+    What it starts from now on is ordinary if it goes `alone`.
     """
     with suppress(OSError):
         _schedule(os.SCHED_RR | os.SCHED_RESET_ON_FORK * alone, _FIRST)

@@ -32,8 +32,8 @@ class StopFlag:
         """Whether the process has been asked to stop."""
         return self._raised
 
-    def set(self) -> None:
-        """Ask the process to stop."""
+    def set(self, *_: object) -> None:
+        """Ask the process to stop; takes what a signal's handler is given."""
         self._raised = True
 
 
@@ -41,7 +41,7 @@ def stop_on_signals() -> StopFlag:
     """A flag that SIGINT and SIGTERM set from now on, instead of ending the process at once."""
     flag = StopFlag()
     for number in _STOPS:
-        signal.signal(number, lambda _number, _frame: flag.set())
+        signal.signal(number, flag.set)
     return flag
 
 
@@ -64,10 +64,10 @@ def _is_main_thread() -> bool:
 def stop_flag() -> Iterator[StopFlag]:
     """A flag that SIGINT and SIGTERM set within the block; never that of another thread."""
     flag = StopFlag()
-    if not _is_main_thread():
-        yield flag
-        return
-    with _handled(lambda _number, _frame: flag.set()):
+    if _is_main_thread():
+        with _handled(flag.set):
+            yield flag
+    else:
         yield flag
 
 
@@ -128,11 +128,9 @@ def _interrupt(_number: int, frame: FrameType | None) -> None:
 
 
 def die_with_parent(parent: int) -> None:
-    """Have the kernel send SIGTERM to this process when process `parent` dies, however it dies.
+    """Have the kernel send SIGTERM to this process when `parent`, which started it, dies.
 
-    Args:
-        parent: the process that started this one, as it said. If it has died before this call,
-            the signal is raised here, since the kernel will not send it any more.
+    If it has died before this call, the signal is raised here: the kernel sends none any more.
     """
     ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)
     if os.getppid() != parent:
@@ -140,13 +138,9 @@ def die_with_parent(parent: int) -> None:
 
 
 def kill_if_orphaned(parent: int, patience: float = _PATIENCE) -> None:
-    """Have this process killed if it still runs some time after process `parent` has died.
+    """Have this process killed if it still runs `patience` seconds after `parent` has died.
 
     It may be busy in a library, or wait for a lock: then it heeds no signal that it can handle.
-
-    Args:
-        parent: the process that started this one, as it said.
-        patience: how long this process may outlive it, s.
     """
 
     def outlive() -> None:
@@ -169,8 +163,7 @@ def interrupts_held() -> Iterator[None]:
     For workers: Ctrl-C, which the terminal sends to all, is their parent's to handle. A worker
     inherits the blocked signal, so there is no moment, not even among its first imports, at which
     it would be hit. The parent's other threads do not block it; so it is noted here, and raised at
-    the end: in the midst of a start Python may lose an interrupt. Of another thread than the main
-    one, which signals do not reach, nothing is held.
+    the end. Of another thread than the main one, which signals do not reach, nothing is held.
     """
     if not _is_main_thread():
         yield

@@ -13,15 +13,25 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from math import prod
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from quadriga.shared import members
-from quadriga.shared.about import QUESTIONS
+from quadriga.shared.about import About, about_key
 from quadriga.shared.codec import MAX_BYTES, MAX_TEXT
 from quadriga.shared.config.sections import Config
-from quadriga.shared.members import AGENT, DOCTOR, LEADS, OBSERVER, RECORDER, ROLES, ROUTER
+from quadriga.shared.members import (
+    AGENT,
+    DOCTOR,
+    LEADS,
+    OBSERVER,
+    RECORDER,
+    ROLES,
+    ROUTER,
+    Member,
+    Role,
+)
 from quadriga.shared.messages import Message
 from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.topic import Topic
@@ -44,38 +54,18 @@ _FRAME: Final = 32
 _ANSWER: Final = 256  # bytes of a question whether all has arrived, and of the answer
 
 
-@dataclass(frozen=True, slots=True)
-class Identity:
-    """Who a certificate is for.
+class Rights(NamedTuple):
+    """The keys that one identity may publish on, and the key expressions that it may hear."""
 
-    Attributes:
-        name: that of the process on the bus; `observer` of all who only look on.
-        role: the name of a row of the table of processes, or as `name`.
-        robot: whose process it is; "" of one that is for all.
+    publishes: list[str]
+    hears: list[str]
+
+
+def team_identities(config: Config) -> tuple[Member, ...]:
+    """Everybody who may be on a team's bus, whatever it records and however it plans.
+
+    Each has a certificate of its name; those who only look on share that of `observer`.
     """
-
-    name: str
-    role: str
-    robot: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class Rights:
-    """What one identity may do.
-
-    Attributes:
-        identity: who.
-        publishes: keys that it may publish on.
-        hears: key expressions that it may subscribe to.
-    """
-
-    identity: Identity
-    publishes: tuple[str, ...]
-    hears: tuple[str, ...]
-
-
-def team_identities(config: Config) -> tuple[Identity, ...]:
-    """Everybody who may be on a team's bus, whatever it records and however it plans."""
     team = members.team_members(
         robot_names(config.team.robots),
         central=True,
@@ -84,10 +74,7 @@ def team_identities(config: Config) -> tuple[Identity, ...]:
     )
     foreign = {name for topic in TABLE for name in (*topic.senders, *topic.receivers)}
     foreign -= {*_OTHERS, *(role.name for role in ROLES)}
-    return (
-        *(Identity(member.name, member.role.name, member.robot) for member in team),
-        *(Identity(name, name) for name in (*_OTHERS, *sorted(foreign))),
-    )
+    return (*team, *(Member(name, Role(name, "")) for name in (*_OTHERS, *sorted(foreign))))
 
 
 def identity_of(process: str) -> str:
@@ -95,27 +82,25 @@ def identity_of(process: str) -> str:
     return OBSERVER if _OBSERVER_NAME.fullmatch(process) else process
 
 
-def team_rights(config: Config) -> tuple[Rights, ...]:
-    """The rights of everybody who may be on a team's bus but the router, which enforces them."""
+def team_rights(config: Config) -> dict[str, Rights]:
+    """By name the rights of all on a team's bus but the router, which enforces them."""
     team, robots = config.team.name, robot_names(config.team.robots)
-    found = list[Rights]()
+    found = dict[str, Rights]()
     for who in team_identities(config):
-        if who.role in _HEARERS:
-            found.append(Rights(who, (), (f"{team}/**",)))
-        elif who.role != ROUTER:
-            sent = [topic for topic in TABLE if topic is ESTOP or who.role in topic.senders]
-            heard = [topic for topic in TABLE if who.role in topic.receivers]
-            found.append(
-                Rights(
-                    who,
-                    tuple(t.key(team, name) for t in sent for name in _names(who, t, robots)),
-                    tuple(t.key(team, _heard_of(who, t)) for t in heard),
-                )
+        role = who.role.name
+        if role in _HEARERS:
+            found[who.name] = Rights([], [f"{team}/**"])
+        elif role != ROUTER:
+            sent = [topic for topic in TABLE if topic is ESTOP or role in topic.senders]
+            heard = [topic for topic in TABLE if role in topic.receivers]
+            found[who.name] = Rights(
+                [t.key(team, name) for t in sent for name in _names(who, t, robots)],
+                [t.key(team, who.robot if t is STATE and role == AGENT else "*") for t in heard],
             )
-    return tuple(found)
+    return found
 
 
-def _names(who: Identity, topic: Topic, robots: Sequence[str]) -> Sequence[str]:
+def _names(who: Member, topic: Topic, robots: Sequence[str]) -> Sequence[str]:
     """The robots for whom a sender of a topic may speak; [""] of a topic that is for all."""
     if topic in _OF_LEAD and who.name not in LEADS:
         return ()
@@ -126,10 +111,6 @@ def _names(who: Identity, topic: Topic, robots: Sequence[str]) -> Sequence[str]:
     return (who.robot,) if who.robot else robots
 
 
-def _heard_of(who: Identity, topic: Topic) -> str:
-    return who.robot if topic is STATE and who.role == AGENT else "*"
-
-
 def router_rules(config: Config) -> dict[str, Any]:
     """Zenoh's settings of a team's router: who may send and hear what, and how much."""
     return {"access_control": access_control(config), **capacity(config)}
@@ -138,18 +119,17 @@ def router_rules(config: Config) -> dict[str, Any]:
 def access_control(config: Config) -> dict[str, Any]:
     """Zenoh's `access_control`: everything denied but what the team's rights permit."""
     team = config.team.name
-    tokens = [f"{team}/*/*/*"]
+    tokens, questions = [f"{team}/*/*/*"], [f"{team}/*/{RECEIVED}", about_key(team, "*")]
     # What everybody with a valid certificate may do: see who is there, and ask how it is.
     common = [
         _rule("tokens-seen", ["liveliness_token"], _OUT, tokens),
         _rule("tokens-asked", ["liveliness_query", "declare_liveliness_subscriber"], _BOTH, tokens),
         # A publisher sends nothing before it knows that somebody listens.
         _rule("listeners-seen", ["declare_subscriber"], _OUT, [f"{team}/**"]),
-        _rule("questions", ["declare_queryable", "query", "reply"], _BOTH, questions_of(team)),
+        _rule("questions", ["declare_queryable", "query", "reply"], _BOTH, questions),
     ]
     rules, subjects, policies = [*common], list[dict[str, Any]](), list[dict[str, Any]]()
-    for rights in team_rights(config):
-        name = rights.identity.name
+    for name, rights in team_rights(config).items():
         own = [_rule(f"{name}-token", ["liveliness_token"], _IN, [f"{team}/{name}/*/*"])]
         if rights.publishes:
             own.append(_rule(f"{name}-publishes", ["put"], _IN, rights.publishes))
@@ -187,7 +167,7 @@ def capacity(config: Config) -> dict[str, Any]:
     limits = [
         *((t.name, ["put"], t.key(team, "*"), largest(t.type)) for t in TABLE),
         ("receipts", asked, f"{team}/*/{RECEIVED}", _ANSWER),
-        *((q.name, asked, q.key(team, "*"), largest(q.type)) for q in QUESTIONS),
+        ("about", asked, about_key(team, "*"), largest(About)),
     ]
     return {
         "low_pass_filter": [
@@ -211,8 +191,3 @@ def largest(kind: type[Message]) -> int:
             size = 8 * prod(d if isinstance(d, int) else _LENGTHS.get(d, MAX_BYTES) for d in shape)
         total += len(item.name) + _FRAME + size
     return min(total, MAX_BYTES)
-
-
-def questions_of(team: str) -> list[str]:
-    """What anybody may ask a process: whether all has arrived, and who it is."""
-    return [f"{team}/*/{RECEIVED}", *(question.key(team, "*") for question in QUESTIONS)]

@@ -10,10 +10,9 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from cryptography import x509
 from cryptography.exceptions import InvalidSignature, UnsupportedAlgorithm
@@ -25,7 +24,7 @@ from quadriga.shared.security.access import identity_of
 AUTHORITY: Final = "authority.pem"
 CERTIFICATE: Final = "certificate.pem"
 KEY: Final = "key.pem"
-OTHERS: Final = 0o077  # permissions of a file that others than its owner have
+_OTHERS: Final = 0o077  # permissions of a file that others than its owner have
 _TLS: Final = "transport/link/tls"
 
 VALID: Final = "valid"
@@ -43,16 +42,8 @@ UNREADABLE: Final = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Certificate:
-    """A certificate.
-
-    Attributes:
-        name: its common name.
-        hosts: at which its owner listens.
-        begins: from when on it is valid.
-        expires: when it is not valid any more.
-    """
+class Certificate(NamedTuple):
+    """A certificate: its common name, at which hosts its owner listens, and when it is valid."""
 
     name: str
     hosts: tuple[str, ...]
@@ -134,15 +125,8 @@ def _damaged(path: Path, got: str) -> ConfigError:
     return ConfigError(str(path), got[:200], "a certificate", "damaged? `quadriga certs renew`")
 
 
-@dataclass(frozen=True, slots=True)
-class TlsFiles:
-    """What one process shows and trusts.
-
-    Attributes:
-        authority: certificate of who signs the team's.
-        certificate: the process's own.
-        key: its private key.
-    """
+class TlsFiles(NamedTuple):
+    """What one process shows and trusts: whose signature, its own certificate and private key."""
 
     authority: Path
     certificate: Path
@@ -155,11 +139,7 @@ class TlsFiles:
 
 
 def tls_files(certificates: str, process: str) -> TlsFiles:
-    """The files of a process.
-
-    Args:
-        certificates: the folder of the configuration.
-        process: its name on the bus.
+    """The files of a process, by its name on the bus, in the folder of the configuration.
 
     Raises:
         ConfigError: one is missing or empty, others may read the key, or the certificate is
@@ -168,13 +148,14 @@ def tls_files(certificates: str, process: str) -> TlsFiles:
     identity = identity_of(process)
     files = TlsFiles.within(Path(certificates).absolute() / identity)
     copy = f"`quadriga certs make` makes it; copy the folder {identity} to this machine"
-    for path in (files.authority, files.certificate, files.key):
+    for path in files:
         if not path.is_file() or not path.stat().st_size:
             got = "an empty file" if path.is_file() else "no such file"
             raise ConfigError(str(path), got, f"that of {identity}", copy)
-    if files.key.stat().st_mode & OTHERS:
-        mode = f"mode {files.key.stat().st_mode & 0o777:o}"
-        raise ConfigError(str(files.key), mode, "600", "others may read this private key")
+    mode = files.key.stat().st_mode & 0o777
+    if mode & _OTHERS:
+        cause = "others may read this private key"
+        raise ConfigError(str(files.key), f"mode {mode:o}", "600", cause)
     name = read_certificate(files.certificate).name
     if name != identity:  # the router would silently deny what it says
         got = f"the certificate of {name!r}"

@@ -19,14 +19,8 @@ from quadriga.drive.gamepad import EVENT_BYTES, Gamepad, take, wish_of
 from quadriga.drive.wish import standing
 from quadriga.plant.commands import CommandBox
 from quadriga.recordings.echo import format_entry
-from quadriga.shared.about import QUESTIONS, About
-from quadriga.shared.bus.diagnostics import (
-    MemberAnswer,
-    TeamNorm,
-    TeamView,
-    describe_absent,
-    diagnose,
-)
+from quadriga.shared.about import About
+from quadriga.shared.bus.diagnostics import MemberAnswer, TeamView, describe_absent, diagnose
 from quadriga.shared.bus.discovery import describe_process, read_about
 from quadriga.shared.codec import decode, encode, envelope
 from quadriga.shared.config.load import load
@@ -85,10 +79,9 @@ class Answers:
 
     def __init__(self) -> None:
         config = load(None, {"team.robots": 2})
-        others = [encode(example(question.type)) for question in QUESTIONS]
-        self._good = (*others, encode(describe_process(config, "r1")))
+        self._good = (encode(example(About)), encode(describe_process(config, "r1")))
         self._members = team_members(("r1", "r2"), central=False, recorded=False, plant_each=False)
-        self._norm = TeamNorm(describe_process(config, SIM), "abc", "r1")
+        self._lead = describe_process(config, SIM)
 
     def make(self, random: np.random.Generator) -> bytes:
         return damage(choose(self._good, random), random)
@@ -96,7 +89,7 @@ class Answers:
     def read(self, content: bytes) -> None:
         told = {"r1": [MemberAnswer(read_about("r1", content), 0, 1)]}
         names = frozenset(("r1", "r2", SIM))
-        view = TeamView(True, names, frozenset(), names, told, self._norm)
+        view = TeamView(True, names, frozenset(), names, told, self._lead)
         for member in self._members:
             for found in diagnose(member, view):
                 assert found.text == printable_line(found.text)

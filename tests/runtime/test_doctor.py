@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from quadriga.shared.about import ABOUT, About
+from quadriga.shared.about import About, about_key
 from quadriga.shared.bus.discovery import ProcessInfo, describe_process
 from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.codec import decode, encode
@@ -87,7 +87,7 @@ def test_each_process_is_told_with_what_is_wrong_with_it(
     ProcessInfo(buses["r1"], other, "ab" * 32)
     newer = encode(replace(describe_process(config, "operator"), version="9", stage="here"))
     assert decode(newer, About).wall_ns == 0, "it lives in 1970"
-    buses["operator"].answer(ABOUT.key("team", "operator"), lambda: newer)
+    buses["operator"].answer(about_key("team", "operator"), lambda: newer)
     for name in ("sim", "r1", "operator"):
         buses[name].declare(HERE)
     keys = [f"bus.endpoint={config.bus.endpoint}", "bus.mode=client", "team.robots=3"]
@@ -170,7 +170,7 @@ def test_a_process_with_another_configuration_does_not_walk(make_team: Make) -> 
         running.watch(lambda: False)
     mu = f"controller.mu {team.config.controller.mu}"
     assert "process operator: got exit status 2" in str(caught.value)
-    assert f"got controller.mu 0.31, expected {mu} as sim has it" in str(caught.value)
+    assert f"configuration: controller.mu 0.31, sim has {mu}," in str(caught.value)
     assert BEGUN not in team.log("sim")
 
 

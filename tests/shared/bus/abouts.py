@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any, Final
 
-from quadriga.shared.about import ORDINARY, READY, About
-from quadriga.shared.bus.diagnostics import MemberAnswer, TeamNorm, TeamView
+from quadriga.shared.about import READY, About
+from quadriga.shared.bus.diagnostics import MemberAnswer, TeamView
 
 NAMES: Final = frozenset({"sim", "r1", "r2"})
 SIM: Final = About(
@@ -17,12 +17,10 @@ SIM: Final = About(
     pid=7,
     version="0.1.0",
     code="0123456789abcdef",
-    libraries=("python 3.11.7", "numpy 2.4.0"),
     config=('team.name="team"', "world.seed=5", 'world.mode="lockstep"'),
     messages=("state 5c", "command 3f"),
     predictor="",
     stage=READY,
-    scheduling=ORDINARY,
     sees=("r1", "r2"),
     wall_ns=10**18,
     start_ns=0,
@@ -35,6 +33,9 @@ def about(name: str, **changes: Any) -> About:
     return replace(SIM, **given)
 
 
+PLANNER: Final = about("r1", predictor="ab" * 32)
+
+
 def answer(said: About | None, took_ns: int = 10**6) -> MemberAnswer:
     """An answer for which the asker waited so long, and whose clock is the asker's."""
     return MemberAnswer(said, 10**18 - took_ns // 2, 10**18 + took_ns // 2)
@@ -45,5 +46,4 @@ def view(*said: About, **changes: Any) -> TeamView:
     answers: dict[str, list[MemberAnswer]] = {}
     for item in said:
         answers.setdefault(item.name, []).append(answer(item))
-    base = TeamView(True, NAMES, frozenset(), NAMES, answers, TeamNorm(SIM, "abc", "r1"))
-    return replace(base, **changes)
+    return replace(TeamView(True, NAMES, frozenset(), NAMES, answers, SIM, PLANNER), **changes)

@@ -24,7 +24,7 @@ from quadriga.shared.errors import ProcessError
 from quadriga.shared.members import SIM
 from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns
 from quadriga.team.endpoint import free_endpoint
-from tests.shared.bus.test_session import wait_until
+from tests.shared.bus.test_session import WAIT, wait_until
 
 LOSS = Loss(LEAD_GONE, "process sim")
 
@@ -46,18 +46,11 @@ def together(config: Config) -> Iterator[tuple[Bus, Bus]]:
 
 def complaint(watch: Liveness, tick: int) -> str:
     """What is said in the end."""
-    said = ""
-
-    def poll() -> str:
-        nonlocal said
-        try:
+    deadline = monotonic() + WAIT
+    with pytest.raises(ProcessError) as caught:  # noqa: PT012
+        while monotonic() < deadline:
             watch.poll(tick)
-        except ProcessError as error:
-            said = str(error)
-        return said
-
-    wait_until(poll)
-    return said
+    return str(caught.value)
 
 
 def test_who_drives_time_is_missed_after_its_last_words() -> None:
@@ -112,13 +105,21 @@ def test_a_link_that_is_gone_is_named_and_not_those_behind_it(mode: str) -> None
 
 
 def test_who_is_back_in_time_is_not_missed() -> None:
-    gone: list[Loss | None] = [LOSS, None, LOSS, LOSS]
-    timer = LossTimer(lambda: gone.pop(0), 0.2)
-    assert timer.poll() is None
-    sleep(0.25)
-    assert timer.poll() is timer.poll() is None
-    sleep(0.25)
-    assert timer.poll() == LOSS
+    config = load(None, {"bus.endpoint": free_endpoint()})
+    with together(config) as (sim, r1):
+        timer = LossTimer(r1, config, 0.2)
+        sim.close()
+        wait_until(lambda: not r1.members_at(HERE))
+        assert timer.poll() is None
+        with Bus.open(config.bus, "team", SIM) as again:
+            again.declare(HERE)
+            wait_until(lambda: r1.members_at(HERE))
+            sleep(0.25)
+            assert timer.poll() is None
+        wait_until(lambda: not r1.members_at(HERE))
+        assert timer.poll() is timer.poll() is None
+        sleep(0.25)
+        assert timer.poll() == find_loss(r1, config) is not None
 
 
 def test_a_line_tells_since_when_something_is_missed() -> None:

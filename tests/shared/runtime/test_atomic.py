@@ -12,20 +12,14 @@ from quadriga.shared.errors import ConfigError, name_file_errors
 from quadriga.shared.runtime.atomic import atomic_write, write_text
 
 
-def test_a_file_is_replaced_as_a_whole(tmp_path: Path) -> None:
-    path = tmp_path / "notes.txt"
-    write_text(path, "old")
-    with atomic_write(path) as partial:
-        partial.write_text("new")
-        assert path.read_text() == "old"
-    assert path.read_text() == "new"
-    assert [*tmp_path.iterdir()] == [path]
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    """A file with a text."""
+    write_text(tmp_path / "notes.txt", "± old")
+    return tmp_path / "notes.txt"
 
 
-def test_what_fails_leaves_all_as_it_was(tmp_path: Path) -> None:
-    path = tmp_path / "notes.txt"
-    write_text(path, "± old")
-
+def test_a_file_is_replaced_as_a_whole_or_stays_as_it_was(path: Path) -> None:
     def fail() -> None:
         with atomic_write(path) as partial:
             partial.write_text("half")
@@ -33,15 +27,17 @@ def test_what_fails_leaves_all_as_it_was(tmp_path: Path) -> None:
 
     with pytest.raises(KeyboardInterrupt):
         fail()
-    assert path.read_text(encoding="utf-8") == "± old"
-    assert [*tmp_path.iterdir()] == [path]
+    with atomic_write(path) as partial:
+        partial.write_text("new")
+        assert path.read_text(encoding="utf-8") == "± old"
+    assert path.read_text() == "new"
+    assert [*path.parent.iterdir()] == [path]
 
 
 @pytest.mark.parametrize("number", [errno.ENOSPC, errno.EROFS])
 def test_where_nothing_can_be_written_the_file_is_named_and_what_helps(
-    tmp_path: Path, number: int
+    path: Path, number: int
 ) -> None:
-    path = tmp_path / "notes.txt"
     reason = os.strerror(number)
     with pytest.raises(OSError, match=reason) as caught, atomic_write(path) as partial:
         raise OSError(number, reason, str(partial) if number == errno.EROFS else None)
@@ -53,14 +49,15 @@ def test_where_nothing_can_be_written_the_file_is_named_and_what_helps(
 
 
 def test_a_link_stays_one_what_is_no_file_is_written_to_and_an_error_names_the_path(
-    tmp_path: Path,
+    path: Path,
 ) -> None:
-    (tmp_path / "link").symlink_to(tmp_path / "file")
-    write_text(tmp_path / "link", "new")
-    assert (tmp_path / "link").is_symlink()
-    assert (tmp_path / "file").read_text() == "new"
+    link, nowhere = path.with_name("link"), path.with_name("no") / "file"
+    link.symlink_to(path)
+    write_text(link, "new")
+    assert link.is_symlink()
+    assert path.read_text() == "new"
     write_text(Path("/dev/null"), "new")
     assert Path("/dev/null").is_char_device()
     with pytest.raises(OSError, match="No such file") as caught:
-        write_text(tmp_path / "no" / "file", "new")
-    assert caught.value.filename == str(tmp_path / "no" / "file")
+        write_text(nowhere, "new")
+    assert caught.value.filename == str(nowhere)

@@ -15,31 +15,33 @@ from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.runtime.signals import interruptible, interrupts_held, stop_flag
 
 CHILD = """
-import os, sys
-from quadriga.shared.runtime.signals import die_with_parent
-from quadriga.shared.runtime.clock import sleep
+import os, signal, sys
+from quadriga.shared.runtime.signals import die_with_parent, kill_if_orphaned
+if sys.argv[2:] == ["deaf"]:
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    kill_if_orphaned(int(sys.argv[1]), 0.2)
 die_with_parent(int(sys.argv[1]))
 print(os.getpid(), flush=True)
-sleep(60)
+while True:
+    pass
 """
 PARENT = """
 import os, subprocess, sys
-subprocess.Popen([sys.executable, "-c", sys.argv[1], str(os.getpid())])
+subprocess.Popen([sys.executable, "-c", sys.argv[1], str(os.getpid()), *sys.argv[2:]])
 input()
 """
 
 
-def wait_after(number: signal.Signals) -> None:
-    os.kill(os.getpid(), number)
-    sleep(60.0)
-
-
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_stop_ends_at_once_what_looks_at_no_flag(number: signal.Signals) -> None:
+    def wait_after_it() -> None:
+        os.kill(os.getpid(), number)
+        sleep(60.0)
+
     before = signal.getsignal(number)
     with stop_flag() as stopped:
         with pytest.raises(KeyboardInterrupt), interruptible(stopped):
-            wait_after(number)
+            wait_after_it()
         assert not stopped()
         os.kill(os.getpid(), number)
         assert stopped(), "and after it the flag is raised as before"
@@ -50,46 +52,16 @@ def test_a_stop_ends_at_once_what_looks_at_no_flag(number: signal.Signals) -> No
 
 def alive(pid: int) -> bool:
     try:
-        with open(f"/proc/{pid}/stat") as stat:
-            return stat.read().split()[2] != "Z"
+        return Path(f"/proc/{pid}/stat").read_text().split()[2] != "Z"
     except FileNotFoundError:
         return False
 
 
-def await_end(pid: int) -> None:
-    deadline = monotonic() + 60.0
-    while alive(pid) and monotonic() < deadline:
-        sleep(0.01)
-    assert not alive(pid)
-
-
-def test_kill_9_of_the_parent_ends_the_child() -> None:
-    parent = subprocess.Popen(
-        [sys.executable, "-c", PARENT, CHILD], stdin=subprocess.PIPE, stdout=subprocess.PIPE
-    )
-    assert parent.stdout
-    child = int(parent.stdout.readline())
-    assert alive(child)
-    parent.kill()
-    parent.communicate()
-    await_end(child)
-
-
-SPINS = """
-import os, signal, sys
-from quadriga.shared.runtime.signals import die_with_parent, kill_if_orphaned
-signal.signal(signal.SIGTERM, signal.SIG_IGN)
-die_with_parent(int(sys.argv[1]))
-kill_if_orphaned(int(sys.argv[1]), 0.2)
-print(os.getpid(), flush=True)
-while True:
-    pass
-"""
-
-
-def test_a_child_that_does_not_heed_the_signal_is_killed_some_time_later() -> None:
+@pytest.mark.parametrize("words", [(), ("deaf",)], ids=["heeds", "heeds no signal"])
+def test_kill_9_of_the_parent_ends_the_child(words: tuple[str, ...]) -> None:
+    """One that does not heed the signal is killed some time later."""
     pipe = subprocess.PIPE
-    command = [sys.executable, "-c", PARENT, SPINS]
+    command = [sys.executable, "-c", PARENT, CHILD, *words]
     parent = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True)
     assert parent.stdout
     assert parent.stderr
@@ -99,10 +71,12 @@ def test_a_child_that_does_not_heed_the_signal_is_killed_some_time_later() -> No
     parent.kill()
     said = parent.stderr.read()  # until the child has ended, too
     parent.communicate()
-    assert said == (
-        f"quadriga: killed 0.2 s after process {parent.pid}, which had started this one\n"
-    )
-    await_end(child)
+    killed = f"quadriga: killed 0.2 s after process {parent.pid}, which had started this one\n"
+    assert said == (killed if words else "")
+    deadline = monotonic() + 60.0
+    while alive(child) and monotonic() < deadline:
+        sleep(0.01)
+    assert not alive(child)
 
 
 def test_a_child_whose_parent_is_gone_already_ends_itself() -> None:
@@ -111,26 +85,26 @@ def test_a_child_whose_parent_is_gone_already_ends_itself() -> None:
     assert orphan.stdout == b""
 
 
-def interrupted_while_held(from_a_thread: bool, done: list[bool]) -> None:
-    with interrupts_held():
-        if from_a_thread:
-            signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
-            thread = threading.Thread(target=signal.raise_signal, args=(signal.SIGINT,))
-            thread.start()
-            thread.join()
-        else:
-            signal.raise_signal(signal.SIGINT)
-        done.append(True)
-
-
 @pytest.mark.parametrize("from_a_thread", [False, True])
 def test_an_interrupt_comes_after_the_block(from_a_thread: bool) -> None:
     """Whichever thread the kernel gives it to."""
     done: list[bool] = []
+
+    def interrupted_while_held() -> None:
+        with interrupts_held():
+            if from_a_thread:
+                signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+                thread = threading.Thread(target=signal.raise_signal, args=(signal.SIGINT,))
+                thread.start()
+                thread.join()
+            else:
+                signal.raise_signal(signal.SIGINT)
+            done.append(True)
+
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         with pytest.raises(KeyboardInterrupt):
-            interrupted_while_held(from_a_thread, done)
+            interrupted_while_held()
         assert done == [True]
         assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
     finally:
@@ -157,10 +131,9 @@ def called():
         pass
 
 called()
-ready = True
 """
 PROGRAM = """
-import sys
+import os, sys
 folder, how = sys.argv[1:]
 sys.path.insert(0, folder)
 from quadriga.commands import version
@@ -171,7 +144,7 @@ def run(*_):
         assert library.ready
     else:
         exec(open(folder + "/library.py").read(), {})
-    print("gone on", flush=True)
+    os.write(1, b"gone on\\n")  # at once, or not at all
     while True:
         pass
 
@@ -189,12 +162,7 @@ sys.exit(main())
 def test_an_interrupt_at_a_bad_moment_is_one_line(tmp_path: Path, library: str, how: str) -> None:
     """As a library in C does, this one makes an error of its own of it, or Python loses it."""
     (tmp_path / "library.py").write_text(library, encoding="utf-8")
-    done = subprocess.run(
-        [sys.executable, "-c", PROGRAM, str(tmp_path), how],
-        capture_output=True,
-        text=True,
-        timeout=60.0,
-        check=False,
-    )
+    command = [sys.executable, "-c", PROGRAM, str(tmp_path), how]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60.0, check=False)
     assert (done.returncode, done.stderr) == (130, "quadriga: interrupted\n")
     assert done.stdout == "gone on\n"
