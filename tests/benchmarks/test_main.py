@@ -57,6 +57,7 @@ def test_parts_print_their_lines_and_write_their_figures(
     assert (tmp_path / "b.png").stat().st_size > 10_000
 
 
+@pytest.mark.nightly
 def test_a_start_is_measured(tmp_path: Path) -> None:
     page, found = run(tmp_path / "b.json", "start", "--planner", "none", "--robots", "1")
     part = found["parts"]["start"]
@@ -65,6 +66,7 @@ def test_a_start_is_measured(tmp_path: Path) -> None:
     assert "from the command to the first tick" in page
 
 
+@pytest.mark.nightly
 def test_walks_are_measured_with_and_without_the_bus(tmp_path: Path) -> None:
     words = ("walks", "--planner", "none", "--robots", "1", "--seconds", "1")
     page, found = run(tmp_path / "b.json", *words)
@@ -84,6 +86,7 @@ def test_an_unknown_part_is_refused_by_name(tmp_path: Path) -> None:
     assert "no part wrold" in done.stderr
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("part", ["planner", "fit"])
 def test_parts_can_be_run_by_themselves(part: str) -> None:
     words = [sys.executable, "-m", f"benchmarks.{part}", "--help"]

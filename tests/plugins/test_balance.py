@@ -17,6 +17,7 @@ import pytest
 
 from quadriga.shared.messages import Plan
 
+pytestmark = pytest.mark.nightly
 TOP = Path(__file__).parents[2]
 PACKAGE = "tests/plugins/balance"
 PIP = (
