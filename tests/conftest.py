@@ -34,7 +34,7 @@ def _realtime(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Teams of processes take long: they come first, or one worker would end after the others."""
-    items.sort(key=lambda item: "runtime" not in item.path.parts)
+    items.sort(key=lambda item: not item.nodeid.startswith("tests/runtime/"))
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from benchmarks.as_written import DEFAULT, TIGHT, PaperQp
+from benchmarks.as_written import TIGHT, PaperQp
 from quadriga.agents.gait import horizon_stance
 from quadriga.shared.config.sections import Config, PlannerConfig
 from quadriga.shared.robots.conventions import Array
@@ -99,14 +99,6 @@ def test_one_object_serves_every_tick() -> None:
         counts.append(active)
     assert min(counts) == 0
     assert max(counts) > 5
-
-
-def test_a_warm_start_saves_iterations() -> None:
-    stance, nominal = stance_of(1, 20), nominal_forces(stance_of(1, 20))
-    y_free, y_des = 0.1 * np.random.default_rng(1).normal(size=(2, 6 * N))
-    solver = PaperQp(PLANNER, response(1, 1), {**DEFAULT, "check_termination": 1})
-    cold, warm = (solver.solve(y_free, y_des, stance, nominal).iterations for _ in range(2))
-    assert warm < cold
 
 
 def test_equal_ticks_give_equal_bits() -> None:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import os
 import re
 import shlex
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -16,21 +15,11 @@ from pathlib import Path
 import pytest
 
 from quadriga.shared.messages import Plan
+from tests.plugins.kinds import install_package
 
 pytestmark = pytest.mark.nightly
 TOP = Path(__file__).parents[2]
 PACKAGE = "tests/plugins/balance"
-PIP = (
-    sys.executable,
-    "-m",
-    "pip",
-    "install",
-    "--quiet",
-    "--no-deps",
-    "--no-index",
-    "--no-build-isolation",
-    "--disable-pip-version-check",
-)
 
 
 def documented_commands() -> list[list[str]]:
@@ -46,17 +35,13 @@ class Place:
 
     def __init__(self, folder: Path) -> None:
         self.folder, self.target = folder, folder / "installed"
-        source = folder / "source"
-        shutil.copytree(TOP / PACKAGE, source, ignore=shutil.ignore_patterns("__pycache__"))
-        done = self.run(*PIP, "--target", str(self.target), str(source))
-        assert done.returncode == 0, done.stderr
+        self._path = install_package("balance", folder)
 
     def run(self, *words: str) -> subprocess.CompletedProcess[str]:
-        path = os.pathsep.join(filter(None, (str(self.target), os.environ.get("PYTHONPATH"))))
         return subprocess.run(
             words,
             cwd=self.folder,
-            env={**os.environ, "PYTHONPATH": path},
+            env={**os.environ, "PYTHONPATH": self._path},
             check=False,
             capture_output=True,
             text=True,

@@ -130,8 +130,10 @@ def build_team(folder: Path, **keys: object) -> Team:
 
 
 @pytest.fixture
-def make_team(tmp_path: Path) -> Make:
-    """`build_team` for a folder of the test's own."""
+def make_team(tmp_path: Path, request: pytest.FixtureRequest) -> Make:
+    """`build_team` for a folder of the test's own; at night processes have their priority."""
+    if request.node.get_closest_marker("nightly"):
+        request.getfixturevalue("_realtime")
     return partial(build_team, tmp_path)
 
 

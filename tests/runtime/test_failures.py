@@ -61,7 +61,6 @@ def test_a_frozen_robot_is_named_and_the_walk_ends(make_team: Make, mode: str) -
 
 
 @pytest.mark.nightly
-@pytest.mark.usefixtures("_realtime")
 def test_in_real_time_the_world_waits_for_no_frozen_listener(
     make_team: Make, watcher: Watcher
 ) -> None:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import os
-import shutil
 import signal
 import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,10 +13,10 @@ import pytest
 
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.messages import Command, Event, Measurement, Reference, State, Truth
-from quadriga.shared.runtime.places import SOURCE
 from quadriga.shared.topics import CLOCK
 from quadriga.team.launch import QUADRIGA, Launch, ProcessSpec
 from tests.listening import WAIT
+from tests.plugins.kinds import install_package
 from tests.runtime.conftest import BEGUN, FOREVER, Make, Watcher, await_tick
 from tests.runtime.test_walk import await_walking, processes_of
 
@@ -27,31 +25,19 @@ EACH = {"team__plant_per_robot": True, "world__mode": "realtime", "team__yokes":
 pytestmark = pytest.mark.usefixtures("_compiled")
 
 
-def nightly(test: Any) -> Any:
-    """Its robots must keep real time."""
-    return pytest.mark.nightly(pytest.mark.usefixtures("_realtime")(test))
-
-
 def never() -> bool:
     return False
 
 
-@pytest.fixture(scope="session")
-def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the package of `tests/plugins/puppet`, installed."""
-    folder = tmp_path_factory.mktemp("site")
-    package = folder / "source"  # a copy: pip builds where the source is
-    shutil.copytree(SOURCE / "tests" / "plugins" / "puppet", package)
-    pip = (sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check")
-    flags = ("--no-deps", "--no-build-isolation", "--no-index", "--target", str(folder))
-    subprocess.run([*pip, *flags, str(package)], check=True, timeout=WAIT)
-    return folder
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Of processes that find the package `tests/plugins/puppet`."""
+    return install_package("puppet", tmp_path_factory.mktemp("site"))
 
 
 @pytest.fixture
-def puppets(site: Path, make_team: Make, monkeypatch: pytest.MonkeyPatch) -> Make:
+def puppets(path: str, make_team: Make, monkeypatch: pytest.MonkeyPatch) -> Make:
     """A function that makes a team whose robots are puppets."""
-    path = os.pathsep.join(filter(None, (str(site), os.environ.get("PYTHONPATH", ""))))
     monkeypatch.setenv("PYTHONPATH", path)
     return lambda **keys: make_team(team__plant="puppet", **keys)
 
@@ -74,7 +60,7 @@ def test_a_plant_of_another_package_walks(puppets: Make, keys: dict[str, Any]) -
     assert not list(recording.entries({CLOCK.name}))
 
 
-@nightly
+@pytest.mark.nightly
 def test_robots_in_worlds_of_their_own_walk(make_team: Make) -> None:
     team = make_team(recorder__enabled=True, world__duration=2.0, **EACH)
     recording = team.run(standing=False)
@@ -82,7 +68,7 @@ def test_robots_in_worlds_of_their_own_walk(make_team: Make) -> None:
         assert max(m.y[1] for m in recording.messages(Measurement, robot)) > 0.3, "it walks"
 
 
-@nightly
+@pytest.mark.nightly
 def test_a_fall_in_one_world_ends_the_walk_of_all(make_team: Make) -> None:
     push = "r2:2000:0:0.1:0.2"
     team = make_team(recorder__enabled=True, world__duration=9.0, world__push=push, **EACH)
@@ -94,7 +80,7 @@ def test_a_fall_in_one_world_ends_the_walk_of_all(make_team: Make) -> None:
     assert [e.kind for e in events].count("start") == 1
 
 
-@nightly
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("dies", "other", "number"),
     [(2, 1, signal.SIGTERM), (2, 1, signal.SIGKILL), (1, 2, signal.SIGKILL)],
@@ -117,7 +103,7 @@ def test_a_plant_that_dies_stops_the_team_and_is_named(
     assert not [pid for pid in pids.values() if os.path.exists(f"/proc/{pid}")]
 
 
-@nightly
+@pytest.mark.nightly
 @pytest.mark.parametrize(("frozen", "other"), [(1, 2), (2, 1)])
 def test_a_frozen_plant_is_missed_in_real_time_whoever_leads(
     puppets: Make, watcher: Watcher, frozen: int, other: int
@@ -159,7 +145,7 @@ def test_a_robot_whose_agent_leaves_ends_the_walk_of_all(make_team: Make) -> Non
         team.await_log("plant_r1", "command-lost  r2 gone")
 
 
-@nightly
+@pytest.mark.nightly
 def test_a_walk_that_is_told_to_stop_leaves_no_plant_behind(make_team: Make) -> None:
     team = make_team(world__duration=FOREVER, **EACH)
     out = team.folder / "out"

@@ -26,12 +26,10 @@ from quadriga.shared.topics import TRUTH
 from tests.listening import await_true
 from tests.runtime.conftest import BEGUN, FOREVER, Make, Watcher, await_tick
 
-REAL = [pytest.mark.nightly, pytest.mark.usefixtures("_realtime")]
-
 
 @pytest.mark.usefixtures("_compiled")
 @pytest.mark.parametrize(
-    ("mode", "robots"), [("lockstep", 1), pytest.param("realtime", 2, marks=REAL)]
+    ("mode", "robots"), [("lockstep", 1), pytest.param("realtime", 2, marks=pytest.mark.nightly)]
 )
 def test_stopped_released_and_sent_on(
     make_team: Make, watcher: Watcher, capsys: pytest.CaptureFixture[str], mode: str, robots: int
