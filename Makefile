@@ -97,10 +97,9 @@ pages: $(STAMP)
 	$(BIN)/python -m quadriga.commands.markdown > docs/reference/command_line.md
 	$(BIN)/python -m quadriga.experiments.gallery --page > docs/gallery.md
 
-# Wheel and source distribution, in dist/; with ARGS=--walk also installed into an environment of
-# their own, with all they need from the package index, where a team then walks.
-dist: $(STAMP)
-	$(BIN)/python -m tests.deploy.dist $(ARGS)
+# Wheel and source distribution, in dist/.
+dist: $(TOOLS)
+	$(BIN)/python -m tests.deploy.dist
 
 manual: $(MANUAL)
 	$(BIN)/python -m sphinx --builder html --quiet --fail-on-warning docs docs/_build
