@@ -12,7 +12,6 @@ import numpy as np
 
 from quadriga.experiments.campaign.ledger import (
     ROWS,
-    Ledger,
     manifest_text,
     read_manifest,
     read_rows,
@@ -70,19 +69,6 @@ def trials(folder: Path) -> Reader:
             found.count_plans()
 
     return file_reader(path, [rows_text(rows, campaign).encode()], read, _change_cells)
-
-
-def ledgers(folder: Path) -> Reader:
-    """A campaign's folder that another one goes on with."""
-    campaign = manifest("none", "distributed")
-    path = folder / ROWS
-    good = rows_text([row("none", 0)], campaign).encode()
-
-    def read(path: Path) -> None:
-        with Ledger(path.parent, campaign) as ledger:
-            assert len(ledger.rows) < 3
-
-    return file_reader(path, [good], read, _change_cells)
 
 
 class Packs:

@@ -12,8 +12,6 @@ from typing import Any, Final, cast
 import numpy as np
 
 from quadriga.experiments.published.experiment_file import read_experiment
-from quadriga.experiments.tuning.tuning_file import read_tuning
-from quadriga.experiments.variants import parse_variants
 from quadriga.shared.config.load import load
 from quadriga.shared.config.reference_trace import ROW_END, inline_trace, trace_of
 from quadriga.shared.config.write import to_toml
@@ -69,20 +67,6 @@ def experiments(folder: Path) -> Reader:
     """Files of experiments."""
     good = sorted((_DEPLOY / "experiments").glob("*.toml"))
     return toml_files(folder / "mine.toml", good, read_experiment)
-
-
-def tunings(folder: Path) -> Reader:
-    """Files of tunings."""
-    good = sorted((_DEPLOY / "tuning").glob("*.toml"))
-    return toml_files(folder / "tuning.toml", good, read_tuning)
-
-
-def variants(folder: Path) -> Reader:
-    """Files of variants, which are configurations of several names."""
-    good = folder / "good-variants.toml"
-    good.write_text(to_toml(load()), encoding="utf-8")
-    path = folder / "variants.toml"
-    return toml_files(path, [good], lambda path: parse_variants(["a:world.seed=3"], path))
 
 
 def reference_traces(folder: Path) -> Reader:

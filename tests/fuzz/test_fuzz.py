@@ -31,18 +31,13 @@ KINDS: Final[Mapping[str, Callable[[Path], Target]]] = {
     "operator-answers": messages.operator_answers,
     "configurations": configurations.Configurations,
     "experiments": configurations.experiments,
-    "tunings": configurations.tunings,
-    "variants": configurations.variants,
     "reference-traces": configurations.reference_traces,
     "manifests": campaigns.manifests,
     "trials": campaigns.trials,
-    "ledgers": campaigns.ledgers,
     "packs": campaigns.Packs,
     "json-rows": campaigns.json_rows,
     "predictors": arrays.predictors,
     "datasets": arrays.datasets,
-    "pulse-responses": arrays.pulse_responses,
-    "repetitions": arrays.repetitions,
     "saved-programs": arrays.saved_programs,
     "certificates": certificates.Certificates,
     "authorities": certificates.authorities,
@@ -57,7 +52,7 @@ KINDS: Final[Mapping[str, Callable[[Path], Target]]] = {
 INPUTS = {"messages": 600, "configurations": 160, "predictors": 80, "recordings": 40}
 FEW = 20
 REFUSED = 0.25
-READ = ("traces", "exports", "replays", "realtime-replays", "variants")
+READ = ("traces", "exports", "replays", "realtime-replays")
 PATIENCE: Final = 60.0  # s of wall time, after which an input is given up
 MOST_MB: Final = 200.0  # that memory may grow
 LONGEST: Final = 2500  # characters of an error
