@@ -17,7 +17,7 @@ from tests.runtime.conftest import Make, Team
 
 TROT = SOURCE / "deploy" / "controllers" / "trot.py"
 BARE = SOURCE / "deploy" / "controllers" / "bare_stand.py"
-FAULTY = SOURCE / "tests" / "runtime" / "faulty_controller.py"
+FAULTY = SOURCE / "tests" / "runtime" / "standing_agent.py"
 
 
 def assert_checked(team: Team) -> None:
