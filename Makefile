@@ -9,7 +9,7 @@ MANUAL := $(VENV)/.manual
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 ARGS ?=
 
-.PHONY: install tools walk prepared test test-containers image-lock lint fuzz fuzz-readers starts endurance format docs dist pages manual links gallery figures clip acceptance bench bench-against bench-planner bench-recorder
+.PHONY: install tools walk prepared test nightly test-containers image-lock lint fuzz endurance format docs dist pages manual links gallery figures clip acceptance bench bench-against bench-planner bench-recorder
 
 install: $(STAMP)
 
@@ -46,8 +46,13 @@ prepared: $(TOOLS)
 # Files are taken in the order of tests/conftest.py. Whoever tests is not started again after a test
 # that hung, which would hang again.
 test: prepared
-	$(BIN)/python -m pytest --numprocesses 3 --dist loadfile --no-loadscope-reorder \
-		--max-worker-restart 0 $(ARGS)
+	$(BIN)/python -m pytest -m "not nightly" --numprocesses 3 --dist loadfile \
+		--no-loadscope-reorder --max-worker-restart 0 $(ARGS)
+
+# One by one what keeps real time, needs a browser, networks of its own or the package index, types
+# what pages show, or takes long; some twenty minutes.
+nightly: prepared
+	$(BIN)/python -m pytest -m nightly $(ARGS)
 
 lint: $(TOOLS)
 	$(BIN)/ruff check .
@@ -69,16 +74,6 @@ image-lock: $(TOOLS)
 # A million damaged packets through the bridges of every kind of robot; some six minutes.
 fuzz: $(TOOLS)
 	$(BIN)/python -m tests.bridges.fuzz $(ARGS)
-
-# 100,000 damaged inputs through every reader of bytes that others may have written: messages, words,
-# configurations, predictors, campaigns, certificates, recordings. One that takes long, needs much
-# memory or ends in anything but an error of the tree fails. ARGS='--only KIND', '--json FILE'.
-fuzz-readers: $(TOOLS)
-	$(BIN)/python -m tests.fuzz $(ARGS)
-
-# 200 walks that are started and stopped at random moments: does any process outlive its walk?
-starts: $(TOOLS)
-	$(BIN)/python -m tests.runtime.starts $(ARGS)
 
 # Half an hour of two robots in real time: does memory grow, is anything lost?
 endurance: $(STAMP)
@@ -102,10 +97,9 @@ pages: $(STAMP)
 	$(BIN)/python -m quadriga.commands.markdown > docs/reference/command_line.md
 	$(BIN)/python -m quadriga.experiments.gallery --page > docs/gallery.md
 
-# Wheel and source distribution, in dist/; with ARGS=--walk also installed into an environment of
-# their own, with all they need from the package index, where a team then walks.
-dist: $(STAMP)
-	$(BIN)/python -m tests.deploy.dist $(ARGS)
+# Wheel and source distribution, in dist/.
+dist: $(TOOLS)
+	$(BIN)/python -m tests.deploy.dist
 
 manual: $(MANUAL)
 	$(BIN)/python -m sphinx --builder html --quiet --fail-on-warning docs docs/_build

@@ -6,13 +6,13 @@ import json
 import signal
 import subprocess
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from quadriga.shared.runtime.clock import monotonic, sleep
+from tests.listening import await_true
+from tests.quadriga.experiments.processes import await_gone, children
 
 TOP = Path(__file__).parents[2]
 NO_TSID = "raise ImportError('not installed')\n"
@@ -57,6 +57,7 @@ def test_parts_print_their_lines_and_write_their_figures(
     assert (tmp_path / "b.png").stat().st_size > 10_000
 
 
+@pytest.mark.nightly
 def test_a_start_is_measured(tmp_path: Path) -> None:
     page, found = run(tmp_path / "b.json", "start", "--planner", "none", "--robots", "1")
     part = found["parts"]["start"]
@@ -65,6 +66,7 @@ def test_a_start_is_measured(tmp_path: Path) -> None:
     assert "from the command to the first tick" in page
 
 
+@pytest.mark.nightly
 def test_walks_are_measured_with_and_without_the_bus(tmp_path: Path) -> None:
     words = ("walks", "--planner", "none", "--robots", "1", "--seconds", "1")
     page, found = run(tmp_path / "b.json", *words)
@@ -84,6 +86,7 @@ def test_an_unknown_part_is_refused_by_name(tmp_path: Path) -> None:
     assert "no part wrold" in done.stderr
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("part", ["planner", "fit"])
 def test_parts_can_be_run_by_themselves(part: str) -> None:
     words = [sys.executable, "-m", f"benchmarks.{part}", "--help"]
@@ -94,40 +97,14 @@ def test_parts_can_be_run_by_themselves(part: str) -> None:
 
 def test_an_interrupt_leaves_no_process_and_no_file(tmp_path: Path) -> None:
     words = command(tmp_path / "b.json", "bus")
-    with subprocess.Popen(
-        words, cwd=TOP, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as bench:
-        children = awaited_children(bench.pid, 2)
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen(words, cwd=TOP, text=True, **pipes) as bench:  # type: ignore[call-overload]
+        await_true(lambda: len(children(bench.pid)) > 2)
+        helpers = children(bench.pid)
         bench.send_signal(signal.SIGINT)
         _, errors = bench.communicate(timeout=20.0)
     assert bench.returncode == 130
     assert "interrupted" in errors
     assert "Traceback" not in errors
-    assert not any(lives(pid) for pid in children)
+    await_gone(helpers)
     assert not (tmp_path / "b.json").exists()
-
-
-def awaited_children(pid: int, count: int) -> Sequence[int]:
-    """Processes of the benchmark, once there are as many as its team has."""
-    deadline = monotonic() + 20.0
-    while monotonic() < deadline:
-        text = Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="ascii")
-        found = [int(word) for word in text.split()]
-        if len(found) > count:
-            return found
-        sleep(0.02)
-    raise AssertionError("the benchmark started no processes")
-
-
-def lives(pid: int) -> bool:
-    """Whether a process is still there after the moment that a helper of Python's takes to end."""
-    stat = Path(f"/proc/{pid}/stat")
-    deadline = monotonic() + 5.0
-    while monotonic() < deadline:
-        try:
-            if stat.read_text(encoding="ascii").rpartition(") ")[2].startswith("Z"):
-                return False
-        except (FileNotFoundError, ProcessLookupError):
-            return False
-        sleep(0.02)
-    return True

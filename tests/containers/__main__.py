@@ -9,15 +9,12 @@ should, 1 if not, 2 if there is no engine.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
-from benchmarks import slow_motion
-from benchmarks.slow_motion import read_speed
 from quadriga.recordings.check import check, format_findings
 from quadriga.recordings.traces import read_traces
 from quadriga.shared import codes
@@ -83,22 +80,6 @@ def unaware(team: Containers) -> str:
     return next((f"{name}: {text}" for name, text in said if f"hear {KILLED}" not in text), "")
 
 
-def write_slow_motion(path: Path, speed: float) -> Path:
-    """Write a Compose file that lets all services run by slow clocks.
-
-    Args:
-        path: of the file.
-        speed: of the clocks, as a share of their own.
-    """
-    inside = "/slow_motion.py"
-    service = {
-        "entrypoint": ["python3", inside, str(speed), "quadriga"],
-        "volumes": [f"{slow_motion.__file__}:{inside}:ro"],
-    }
-    path.write_text(json.dumps({"services": dict.fromkeys(SERVICES, service)}), encoding="utf-8")
-    return path
-
-
 def walk(team: Containers, folder: Path) -> None:
     """Walk in containers, kill an agent, and judge what was recorded."""
     team.build()
@@ -112,7 +93,7 @@ def walk(team: Containers, folder: Path) -> None:
             team.wait(name, _PATIENCE)
     say("the walk is over, all have left")
     expect(f"{KILLED} gone" in team.log("sim"), team.log("sim"))
-    statuses = {name: team.state(name)[1] for name in ("r1", "operator")}
+    statuses = {name: team.status(name) for name in ("r1", "operator")}
     expect(not any(statuses.values()), f"{statuses}")
     team.copy("recorder", "/work/runs", folder)
     judge(folder)
@@ -136,12 +117,6 @@ def main() -> int:
     """Run it; the exit status."""
     parser = argparse.ArgumentParser(prog="make test-containers", description=__doc__)
     parser.add_argument("--seconds", type=float, default=40.0, help="of the walk")
-    parser.add_argument(
-        "--speed",
-        type=read_speed,
-        default=1.0,
-        help="of the clocks, for a slow computer; at most 1",
-    )
     arguments = parser.parse_args()
     interrupt_on_sigterm()  # whoever ends it leaves nothing behind either
     engine = find_engine()
@@ -157,10 +132,7 @@ def main() -> int:
         (folder / "team.toml").write_text(text, encoding="utf-8")
         (folder / "runs").mkdir()
         variables = {"TEAM": str(folder / "team.toml"), "TEAM_SIZE": str(ROBOTS)}
-        slower: tuple[Path, ...] = ()
-        if arguments.speed < 1.0:
-            slower = (write_slow_motion(folder / "slow.json", arguments.speed),)
-        team, status = Containers(engine, variables, slower), 1
+        team, status = Containers(engine, variables), 1
         try:
             walk(team, folder / "runs")
             status = 0

@@ -57,15 +57,10 @@ class Containers:
     Args:
         engine: what runs them.
         variables: what docker-compose.yml is told by the environment.
-        more: Compose files whose keys go before its.
     """
 
-    def __init__(
-        self, engine: Engine, variables: Mapping[str, str], more: tuple[Path, ...] = ()
-    ) -> None:
+    def __init__(self, engine: Engine, variables: Mapping[str, str]) -> None:
         self._engine = engine
-        files = ("docker-compose.yml", *(str(path) for path in more))
-        self._files = [word for name in files for word in ("-f", name)]
         self._environment = {**os.environ, "IMAGE": IMAGE, **variables}
         self._names: dict[str, str] = {}
 
@@ -77,10 +72,6 @@ class Containers:
             if given.get(name):
                 options += ["--build-arg", f"{name}={given[name]}"]
         self._run("build", *options, "-t", IMAGE, "-f", "deploy/Dockerfile", ".", shown=True)
-
-    def run(self, service: str, *command: str) -> str:
-        """Run a service once and remove its container; what it says."""
-        return self._compose("run", "--rm", "--no-deps", service, *command)
 
     def up(self, *services: str) -> None:
         """Start services, and do not wait for them."""
@@ -112,21 +103,13 @@ class Containers:
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         return (done.stdout + done.stderr).strip()
 
-    def state(self, service: str) -> tuple[bool, int]:
-        """Whether a service's container runs, and its last exit status."""
-        found = self._run(
-            "inspect", "-f", "{{.State.Running}} {{.State.ExitCode}}", self.container(service)
-        )
-        running, status = found.split()
-        return running == "true", int(status)
+    def status(self, service: str) -> int:
+        """The last exit status of a service's container."""
+        return int(self._run("inspect", "-f", "{{.State.ExitCode}}", self.container(service)))
 
     def kill(self, service: str) -> None:
         """Have a service's container vanish without a word."""
         self._run("kill", "--signal", "KILL", self.container(service))
-
-    def start(self, service: str) -> None:
-        """Start a container that has ended again."""
-        self._run("start", self.container(service))
 
     def log(self, service: str) -> str:
         """What a service has said."""
@@ -167,7 +150,9 @@ class Containers:
         return self._run("ps", "-a", *filters, "--format", "{{.Names}}").split()[0]
 
     def _compose(self, *words: str) -> str:
-        return self._call([*self._engine.compose, *self._files, "-p", PROJECT, *words])
+        return self._call(
+            [*self._engine.compose, "-f", "docker-compose.yml", "-p", PROJECT, *words]
+        )
 
     def _run(self, *words: str, shown: bool = False) -> str:
         return self._call([self._engine.name, *words], shown=shown)

@@ -18,7 +18,7 @@ from quadriga.shared.config.load import load
 from quadriga.shared.members import DOCTOR, ESTOP, LAST, OBSERVER, RESET, RESUME, ROUTER, STOP
 from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.security.access import team_identities
-from quadriga.team.launch import ProcessSpec, process_table
+from quadriga.team.launch import process_table
 
 TOP = Path(__file__).parents[2]
 FILE = TOP / "docker-compose.yml"
@@ -29,9 +29,8 @@ MOST = 5  # robots
 CONFIG = load(TEAM, {"team.robots": MOST, "planner.kind": "centralised"})
 ROWS = process_table(CONFIG, Path("/run"), Path("/run/predictor.npz"), "sha")
 ONCE = ("certs", "prepare")  # services that do something before the walk
-LATER = ("replay",)
 VIEW = "view"  # looks on: nobody waits for it, and it is not of the team
-ON_THE_BUS = sorted(SERVICES.keys() - {*ONCE, *LATER, VIEW})
+ON_THE_BUS = sorted(SERVICES.keys() - {*ONCE, "replay", VIEW})
 
 
 def resolve(text: str, **variables: str) -> str:
@@ -68,57 +67,46 @@ def started(size: int) -> set[str]:
     }
 
 
-def test_the_file_is_as_the_compose_specification_wants_it() -> None:
-    """By the specification's schema, which comes with the checker."""
-    command = [sys.executable, "-m", "check_jsonschema", "--builtin-schema", "vendor.compose-spec"]
-    done = subprocess.run([*command, FILE], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
-
-
-def test_the_image_carries_the_version_of_the_project() -> None:
-    project = tomllib.loads((TOP / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    name = f"quadriga:{project['version']}"
-    names = {resolve(found["image"]) for found in SERVICES.values()}
-    assert names == {name}
-    assert f"-t {name} ." in (TOP / "deploy/Dockerfile").read_text(encoding="utf-8")
-
-
-def test_the_schema_would_find_a_mistake(tmp_path: Path) -> None:
+def test_the_file_is_as_the_compose_specification_wants_it(tmp_path: Path) -> None:
+    """By the specification's schema, which comes with the checker and finds a mistake."""
     wrong = tmp_path / "docker-compose.yml"
     text = FILE.read_text(encoding="utf-8").replace("stop_grace_period:", "stop_grace_time:")
     wrong.write_text(text, encoding="utf-8")
     command = [sys.executable, "-m", "check_jsonschema", "--builtin-schema", "vendor.compose-spec"]
-    done = subprocess.run([*command, wrong], capture_output=True, text=True, check=False)
-    assert done.returncode == 1
+    for file, status in ((FILE, 0), (wrong, 1)):
+        done = subprocess.run([*command, file], capture_output=True, text=True, check=False)
+        assert done.returncode == status, done.stdout + done.stderr
     assert "stop_grace_time" in done.stdout
+
+
+def test_there_is_one_image_of_this_version_that_only_this_file_builds() -> None:
+    project = tomllib.loads((TOP / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    name = f"quadriga:{project['version']}"
+    assert {resolve(found["image"]) for found in SERVICES.values()} == {name}
+    assert f"-t {name} ." in (TOP / "deploy/Dockerfile").read_text(encoding="utf-8")
+    policies = {name: service["pull_policy"] for name, service in SERVICES.items()}
+    assert policies.pop("prepare") == "build"
+    assert set(policies.values()) == {"never"}
+    assert {name for name, service in SERVICES.items() if "build" in service} == {"prepare"}
 
 
 @pytest.mark.parametrize("size", range(1, MOST + 1))
 def test_team_size_starts_that_many_agents_and_tells_everybody(size: int) -> None:
-    names = started(size)
-    assert {name for name in names if name in robot_names(MOST)} == set(robot_names(size))
-    assert names - {*robot_names(size)} == {
-        *ONCE,
-        "router",
-        "doctor",
-        "recorder",
-        "sim",
-        "operator",
-    }
-    for name in names:
-        keys = vars(arguments_of(name, TEAM_SIZE=str(size)))
-        assert keys["team.robots"] == size
+    around = {*ONCE, "router", "doctor", "recorder", "sim", "operator"}
+    assert started(size) == {*robot_names(size), *around}
+    for name in started(size):
+        assert vars(arguments_of(name, TEAM_SIZE=str(size)))["team.robots"] == size
 
 
-@pytest.mark.parametrize("row", ROWS, ids=lambda row: row.name)
-def test_every_process_of_a_walk_has_a_service(row: ProcessSpec) -> None:
-    verb = row.command.index("quadriga") + 1
-    launched, contained = build_parser().parse_args(row.command[verb:]), arguments_of(row.name)
-    assert contained.call is launched.call
-    assert getattr(contained, "robot", None) == getattr(launched, "robot", None)
-
-
-def test_no_service_is_left_over() -> None:
+def test_every_process_of_a_walk_has_a_service_and_its_time_to_leave() -> None:
+    for row in ROWS:
+        verb = row.command.index("quadriga") + 1
+        launched = build_parser().parse_args(row.command[verb:])
+        contained = arguments_of(row.name)
+        assert contained.call is launched.call
+        assert getattr(contained, "robot", None) == getattr(launched, "robot", None)
+        grace = SERVICES[row.name]["stop_grace_period"]
+        assert float(grace.removesuffix("s")) >= row.grace, row.name
     assert set(ON_THE_BUS) == {row.name for row in ROWS} | {ROUTER, DOCTOR}
 
 
@@ -128,12 +116,9 @@ def test_the_team_is_that_of_the_default_walk() -> None:
     assert resolve("${TEAM_SIZE:-3}") == str(config.team.robots)
     assert len(started(config.team.robots) & set(robot_names(MOST))) == config.team.robots
     assert config.recorder.enabled
-
-
-@pytest.mark.parametrize("service", [*ONCE, *ON_THE_BUS, VIEW])
-def test_all_read_the_one_configuration(service: str) -> None:
-    mounted = mounts_of(service)[str(arguments_of(service).config)]
-    assert (TOP / mounted).resolve() == TEAM
+    for service in (*ONCE, *ON_THE_BUS, VIEW):
+        mounted = mounts_of(service)[str(arguments_of(service).config)]
+        assert (TOP / mounted).resolve() == TEAM, "all read the one configuration"
 
 
 def test_the_team_meets_at_the_router_with_certificates() -> None:
@@ -168,26 +153,23 @@ def test_certificates_are_made_for_all_and_only_their_maker_has_the_authority() 
     assert held == ["certs"]
 
 
-def test_the_router_starts_once_predictor_and_certificates_are_there() -> None:
+def reachable(service: str) -> set[str]:
+    """All that a service waits for, directly or not."""
+    direct = set(SERVICES[service].get("depends_on", ()))
+    return direct.union(*(reachable(name) for name in direct))
+
+
+def test_services_start_in_their_order() -> None:
     done = {"condition": "service_completed_successfully"}
     assert SERVICES[ROUTER]["depends_on"] == dict.fromkeys(ONCE, done)
-
-
-@pytest.mark.parametrize("service", sorted({*ON_THE_BUS} - {ROUTER}))
-def test_nobody_starts_before_the_router(service: str) -> None:
-    """So nobody names those that run once: Podman would run them again for each who does."""
-    assert ROUTER in reachable(service)
-    assert not {*ONCE} & SERVICES[service]["depends_on"].keys()
-
-
-@pytest.mark.parametrize("service", ["recorder", "planner", *robot_names(MOST)])
-def test_who_needs_the_predictor_also_waits_by_itself(service: str) -> None:
-    assert 60.0 <= arguments_of(service).wait <= CONFIG.bus.barrier_timeout
-
-
-def test_the_recorder_hears_the_others_to_the_end() -> None:
+    for service in {*ON_THE_BUS} - {ROUTER}:
+        assert ROUTER in reachable(service), "nobody starts before the router"
+        # Podman would run again those that run once, for each who names them.
+        assert not {*ONCE} & SERVICES[service]["depends_on"].keys()
+    for service in ("recorder", "planner", *robot_names(MOST)):  # who needs the predictor
+        assert 60.0 <= arguments_of(service).wait <= CONFIG.bus.barrier_timeout
     walkers = set(ON_THE_BUS) - {ROUTER, LAST, DOCTOR}
-    assert all(LAST in SERVICES[name]["depends_on"] for name in walkers)
+    assert all(LAST in SERVICES[name]["depends_on"] for name in walkers), "it hears all to the end"
 
 
 @pytest.mark.parametrize("service", ON_THE_BUS)
@@ -208,66 +190,30 @@ def test_the_view_is_reached_from_this_computer_alone_and_keeps_nobody_waiting()
     assert resolve(published) == f"127.0.0.1:8090:{view.port}"
     assert view.host == "0.0.0.0"  # of its container
     assert view.once, "`docker compose up` would not return after the walk"
-    ports = [name for name, service in SERVICES.items() if "ports" in service]
-    assert ports == [VIEW]
+    assert [name for name, service in SERVICES.items() if "ports" in service] == [VIEW]
 
 
-@pytest.mark.parametrize("row", ROWS, ids=lambda row: row.name)
-def test_a_service_has_the_time_to_leave_that_its_process_has(row: ProcessSpec) -> None:
-    assert float(SERVICES[row.name]["stop_grace_period"].removesuffix("s")) >= row.grace
-
-
-def reachable(service: str) -> set[str]:
-    """All that a service waits for, directly or not."""
-    direct = set(SERVICES[service].get("depends_on", ()))
-    return direct.union(*(reachable(name) for name in direct))
-
-
-@pytest.mark.parametrize("service", sorted(SERVICES.keys() - {"certs"}))
-def test_predictor_and_compiled_code_are_shared(service: str) -> None:
-    assert mounts_of(service)["/cache"] == "cache"
-
-
-def test_runs_outlive_their_container() -> None:
-    assert mounts_of("recorder")["/work/runs"] == "runs"
-    assert mounts_of("replay")["/work/runs"] == "runs"
+def test_volumes_are_shared_and_outlive_their_containers() -> None:
+    for service in SERVICES.keys() - {"certs"}:
+        assert mounts_of(service)["/cache"] == "cache", "predictor and compiled code"
+    for service in ("recorder", "replay"):
+        assert mounts_of(service)["/work/runs"] == "runs"
     assert arguments_of("recorder").output is None, "the default is runs/<date>-<time>"
-
-
-def test_every_volume_is_declared_and_used() -> None:
     sources = {source for name in SERVICES for source in mounts_of(name).values()}
     assert {source for source in sources if not source.startswith(".")} == COMPOSE["volumes"].keys()
 
 
 @pytest.mark.parametrize("service", SERVICES)
-def test_a_service_may_do_no_more_than_it_must(service: str) -> None:
+def test_a_service_may_do_and_take_and_reach_no_more_than_it_must(service: str) -> None:
     found = SERVICES[service]
     assert found["init"] is True, "signals reach the process and orphans are reaped"
     assert found["read_only"] is True
     assert found["cap_drop"] == ["ALL"]
     assert "no-new-privileges" in found["security_opt"]
     assert not found.keys() & {"privileged", "pid", "ipc", "cap_add", "user"}
-
-
-def test_no_service_pulls_an_image_that_somebody_else_could_have_made() -> None:
-    policies = {name: service["pull_policy"] for name, service in SERVICES.items()}
-    assert policies.pop("prepare") == "build"
-    assert set(policies.values()) == {"never"}
-    assert len({service["image"] for service in SERVICES.values()}) == 1
-    assert {name for name, service in SERVICES.items() if "build" in service} == {"prepare"}
-
-
-@pytest.mark.parametrize("service", SERVICES)
-def test_a_service_takes_no_more_of_the_machine_than_its_share(service: str) -> None:
-    found = SERVICES[service]
     assert 0.0 < found["cpus"] <= 2.0, "more than a small machine has is refused"
     assert re.fullmatch(r"[1-4]g", found["mem_limit"])
     assert 0 < found["pids_limit"] <= 400
-
-
-@pytest.mark.parametrize("service", SERVICES)
-def test_a_service_reaches_nobody_but_the_team(service: str) -> None:
-    found = SERVICES[service]
     if service in (*ON_THE_BUS, VIEW):
         assert found["networks"] == (["team", "page"] if service == VIEW else ["team"])
         assert "network_mode" not in found

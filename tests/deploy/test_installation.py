@@ -15,6 +15,7 @@ import pytest
 
 from tests.deploy.dist import TOP, build_dist
 
+pytestmark = pytest.mark.nightly
 NEIGHBOUR = "openai-agents==0.24.0"  # installs a package `agents`
 FOLDERS = ("agents", "shared", "sim_server", "plant")
 # What a script sees of the installed package, far from its checkout.

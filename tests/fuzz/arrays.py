@@ -13,22 +13,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from quadriga.agents.predictor.episode import Episode, check_episodes, team_layout, wrench_map
+from quadriga.agents.predictor.episode import Episode, check_episodes, team_layout
 from quadriga.agents.predictor.gates import GateReport, Provenance, read
-from quadriga.agents.predictor.measured_response import (
-    PulseResponses,
-    fit_measured_response,
-    read_pulse_responses,
-    write_pulse_responses,
-)
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.predictor.store import predictor_sha256, save
-from quadriga.experiments.probe.responses import (
-    Repetition,
-    average,
-    read_repetition,
-    write_repetition,
-)
 from quadriga.identification.dataset import Dataset, read_data, write_data
 from quadriga.replay import saved_qp
 from quadriga.replay.saved_qp import SavedQp
@@ -148,35 +136,6 @@ def datasets(folder: Path) -> Archives:
         check_episodes(read_data(path).training, team_layout(1, 4, 8))
 
     return Archives(folder / "data.npz", lambda path: write_data(path, whole), read_all)
-
-
-def pulse_responses(folder: Path) -> Archives:
-    """Responses that a probe has measured, as a predictor is made of them."""
-    meta = PredictorMeta.of(load(None, SMALL))
-    random = np.random.default_rng(0)
-    u, y = random.normal(size=(2, 1, 6, meta.N, 12)), random.normal(size=(2, 1, 6, meta.N, 1, 6))
-    responses, wrench = PulseResponses(np.array([0, 100]), u, y, {}), wrench_map(meta.robot)
-
-    def read_all(path: Path) -> None:
-        fit_measured_response(read_pulse_responses(path), meta.layout, meta.period, wrench)
-
-    return Archives(
-        folder / "responses.npz", lambda path: write_pulse_responses(path, responses), read_all
-    )
-
-
-def repetitions(folder: Path) -> Archives:
-    """Responses that a probe keeps of one world."""
-    random = np.random.default_rng(0)
-    u, y = random.normal(size=(2, 1, 6, 8, 12)), random.normal(size=(2, 1, 6, 8, 1, 6))
-    measured = Repetition(0, np.array([0, 100]), u, y)
-
-    def read_all(path: Path) -> None:
-        average([read_repetition(path), measured])
-
-    return Archives(
-        folder / "repetition.npz", lambda path: write_repetition(path, measured), read_all
-    )
 
 
 def saved_programs(folder: Path) -> Archives:

@@ -12,7 +12,6 @@ import numpy as np
 
 from quadriga.experiments.campaign.ledger import (
     ROWS,
-    Ledger,
     manifest_text,
     read_manifest,
     read_rows,
@@ -26,7 +25,7 @@ from quadriga.shared.errors import QuadrigaError
 from quadriga.team.trial_rows import ROWS as JSON_ROWS
 from quadriga.team.trial_rows import read_rows as read_json_rows
 from tests.fuzz.damage import damage
-from tests.fuzz.target import FileReader, change_json, choose
+from tests.fuzz.target import Reader, change_json, choose, file_reader
 from tests.quadriga.experiments.rows import manifest, row
 
 _DEPLOY: Final = Path(__file__).parents[2] / "deploy"
@@ -45,7 +44,7 @@ _CELLS: Final = (
 )
 
 
-def manifests(folder: Path) -> FileReader:
+def manifests(folder: Path) -> Reader:
     """What a campaign consists of."""
     campaign = manifest("none", "distributed", sweeps=("world.friction",), swept=(("0.5",),))
 
@@ -56,33 +55,20 @@ def manifests(folder: Path) -> FileReader:
         manifest_text(found)
 
     good = manifest_text(campaign).encode()
-    return FileReader(_file(folder, "manifests", FILE), [good], read, change_json)
+    return file_reader(folder / FILE, [good], read, change_json)
 
 
-def trials(folder: Path) -> FileReader:
+def trials(folder: Path) -> Reader:
     """Rows of the trials of a campaign."""
     campaign = manifest("none", "distributed")
     rows = [row("none", 0), row("distributed", 1, fell=2.5), row("none", 2)]
-    path = _file(folder, "trials", ROWS)
+    path = folder / ROWS
 
     def read(path: Path) -> None:
         for found in read_rows(path.parent, campaign):
             found.count_plans()
 
-    return FileReader(path, [rows_text(rows, campaign).encode()], read, _change_cells)
-
-
-def ledgers(folder: Path) -> FileReader:
-    """A campaign's folder that another one goes on with."""
-    campaign = manifest("none", "distributed")
-    path = _file(folder, "ledgers", ROWS)
-    good = rows_text([row("none", 0)], campaign).encode()
-
-    def read(path: Path) -> None:
-        with Ledger(path.parent, campaign) as ledger:
-            assert len(ledger.rows) < 3
-
-    return FileReader(path, [good], read, _change_cells)
+    return file_reader(path, [rows_text(rows, campaign).encode()], read, _change_cells)
 
 
 class Packs:
@@ -118,19 +104,14 @@ class Packs:
                     raise
 
 
-def json_rows(folder: Path) -> FileReader:
+def json_rows(folder: Path) -> Reader:
     """Trials of one configuration, a line of JSON each."""
     line = json.dumps({"fault": "imu", "seed": 3, "ms": 4.5, "went": ["r1", None]}) + "\n"
 
     def read(path: Path) -> None:
         read_json_rows(path.parent)
 
-    return FileReader(_file(folder, "json-rows", JSON_ROWS), [2 * line.encode()], read, change_json)
-
-
-def _file(folder: Path, kind: str, name: str) -> Path:
-    (folder / kind).mkdir()
-    return folder / kind / name
+    return file_reader(folder / JSON_ROWS, [2 * line.encode()], read, change_json)
 
 
 def _change_cells(good: bytes, random: np.random.Generator) -> bytes:

@@ -25,6 +25,7 @@ from quadriga.shared.security.certificates import (
     read_certificate,
 )
 from tests.fuzz.damage import damage
+from tests.fuzz.target import Reader
 
 _NOW: Final = datetime(2026, 1, 1, tzinfo=UTC)
 _NAMES: Final = ("r1." + "9" * 5000, "", "r1.1", "r1.\u0663", "\x1b[2J", "x" * 3000, ".", "r1.-1")
@@ -65,21 +66,20 @@ class Certificates:
         self._folder.standings()
 
 
-class Authorities:
+def authorities(_folder: Path) -> Reader:
     """Certificate and key of a team's authority."""
+    pair = Authority.create("team", _NOW).pair
 
-    def __init__(self) -> None:
-        self._good = Authority.create("team", _NOW).pair
-
-    def make(self, random: np.random.Generator) -> bytes:
-        pair = self._good
+    def change(_: bytes, random: np.random.Generator) -> bytes:
         if random.random() < 0.5:
             return damage(pair.certificate, random) + b"\0\0" + pair.key
         return pair.certificate + b"\0\0" + damage(pair.key, random)
 
-    def read(self, content: bytes) -> None:
+    def read(content: bytes) -> None:
         certificate, _, key = content.partition(b"\0\0")
         Authority(Pair(certificate, key))
+
+    return Reader((b"",), read, change)
 
 
 def _forge(name: str, key: ec.EllipticCurvePrivateKey) -> bytes:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from types import SimpleNamespace
@@ -11,8 +12,6 @@ from typing import Any, Final, cast
 import numpy as np
 
 from quadriga.experiments.published.experiment_file import read_experiment
-from quadriga.experiments.tuning.tuning_file import read_tuning
-from quadriga.experiments.variants import parse_variants
 from quadriga.shared.config.load import load
 from quadriga.shared.config.reference_trace import ROW_END, inline_trace, trace_of
 from quadriga.shared.config.write import to_toml
@@ -20,7 +19,7 @@ from quadriga.shared.errors import QuadrigaError
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import Recording
 from tests.fuzz.damage import damage
-from tests.fuzz.target import VALUES, FileReader, change_toml, toml_lines
+from tests.fuzz.target import VALUES, Reader, change_toml, file_reader
 
 _DEPLOY: Final = Path(__file__).parents[2] / "deploy"
 
@@ -59,51 +58,18 @@ class Configurations:
         to_toml(load(self._path))
 
 
-class TomlFiles:
-    """Files that say what is walked: of experiments, of tunings, of variants.
-
-    Args:
-        path: of the file that is read.
-        good: files of this kind.
-        read: reads one.
-    """
-
-    def __init__(self, path: Path, good: list[Path], read: Any) -> None:
-        self._path, self._read = path, read
-        self._texts = [toml_lines(file.read_text(encoding="utf-8")) for file in good]
-
-    def make(self, random: np.random.Generator) -> bytes:
-        return change_toml(self._texts[int(random.integers(len(self._texts)))], random)
-
-    def read(self, content: bytes) -> None:
-        self._path.write_bytes(content)
-        self._read(self._path)
+def toml_files(path: Path, good: list[Path], reads: Callable[[Path], object]) -> Reader:
+    """Files that say what is walked."""
+    return file_reader(path, [file.read_bytes() for file in good], reads, change_toml)
 
 
-def experiments(folder: Path) -> TomlFiles:
+def experiments(folder: Path) -> Reader:
     """Files of experiments."""
-    return TomlFiles(
-        folder / "mine.toml", sorted((_DEPLOY / "experiments").glob("*.toml")), read_experiment
-    )
+    good = sorted((_DEPLOY / "experiments").glob("*.toml"))
+    return toml_files(folder / "mine.toml", good, read_experiment)
 
 
-def tunings(folder: Path) -> TomlFiles:
-    """Files of tunings."""
-    return TomlFiles(
-        folder / "tuning.toml", sorted((_DEPLOY / "tuning").glob("*.toml")), read_tuning
-    )
-
-
-def variants(folder: Path) -> TomlFiles:
-    """Files of variants, which are configurations of several names."""
-    good = folder / "good-variants.toml"
-    good.write_text(to_toml(load()), encoding="utf-8")
-    return TomlFiles(
-        folder / "variants.toml", [good], lambda path: parse_variants(["a:world.seed=3"], path)
-    )
-
-
-def reference_traces(folder: Path) -> FileReader:
+def reference_traces(folder: Path) -> Reader:
     """Courses of the velocity reference, in files and in configurations."""
     good = (_DEPLOY / "scenarios" / "joystick.csv").read_bytes()
     short = b"".join(good.splitlines(keepends=True)[:12])
@@ -115,4 +81,4 @@ def reference_traces(folder: Path) -> FileReader:
             assert trace is not None
             assert np.isfinite(trace.at(1e6)).all()
 
-    return FileReader(folder / "trace.csv", (good, short, short), read)
+    return file_reader(folder / "trace.csv", (good, short, short), read)

@@ -34,7 +34,7 @@ from quadriga.sim_server.world.faults import build_components, parse_faults, wit
 from quadriga.status.gather import StatusFold
 from tests.a1 import standing as standing_state
 from tests.fuzz.damage import damage
-from tests.fuzz.target import change_json, choose, example
+from tests.fuzz.target import Reader, change_json, example
 
 _EVERYTHING: Final = Expected((1 << 40, 0), 1 << 40, 1 << 40, True)
 _LOOK_EVERY: Final = 100  # messages
@@ -43,7 +43,7 @@ _LOOK_EVERY: Final = 100  # messages
 class Messages:
     """Every type of message, at everybody who takes it."""
 
-    def __init__(self) -> None:
+    def __init__(self, _folder: Path) -> None:
         config = load(None, {"team.robots": 2, "estimator.kind": "truth"})
         self._inbox = Inbox(config, "r1", ("r2",))
         self._box = CommandBox(config.team.name, ("r1", "r2"), config.robot)
@@ -74,93 +74,78 @@ class Messages:
         decode(content, self._topic.type)
 
 
-class Answers:
+def answers(_folder: Path) -> Reader:
     """What processes say of themselves when they are asked."""
+    config = load(None, {"team.robots": 2})
+    members = team_members(("r1", "r2"), central=False, recorded=False, plant_each=False)
+    lead, names = describe_process(config, SIM), frozenset(("r1", "r2", SIM))
 
-    def __init__(self) -> None:
-        config = load(None, {"team.robots": 2})
-        self._good = (encode(example(About)), encode(describe_process(config, "r1")))
-        self._members = team_members(("r1", "r2"), central=False, recorded=False, plant_each=False)
-        self._lead = describe_process(config, SIM)
-
-    def make(self, random: np.random.Generator) -> bytes:
-        return damage(choose(self._good, random), random)
-
-    def read(self, content: bytes) -> None:
+    def read(content: bytes) -> None:
         told = {"r1": [MemberAnswer(read_about("r1", content), 0, 1)]}
-        names = frozenset(("r1", "r2", SIM))
-        view = TeamView(True, names, frozenset(), names, told, self._lead)
-        for member in self._members:
+        view = TeamView(True, names, frozenset(), names, told, lead)
+        for member in members:
             for found in diagnose(member, view):
                 assert found.text == printable_line(found.text)
-        describe_absent(self._members, view)
+        describe_absent(members, view)
         decode(content, About)
 
+    return Reader((encode(example(About)), encode(describe_process(config, "r1"))), read)
 
-class Orders:
+
+def orders(_folder: Path) -> Reader:
     """Texts in messages that order something while the team walks: faults, references of inputs."""
+    components = tuple(build_components(load(None, {"team.robots": 2}).robot))
+    kinds = [f"r1/{part} {kind} 1.5 2" for part, kind in zip(components, cycle(FAULT_KINDS))]
+    ids = ("state:r1:5", "plan:r2:40.1", "reference::12")
+    good = tuple(text.encode() for text in (*kinds, "r2/imu stuck 1", *ids))
 
-    def __init__(self) -> None:
-        config = load(None, {"team.robots": 2})
-        self._components = tuple(build_components(config.robot))
-        parts = zip(self._components, cycle(FAULT_KINDS))
-        kinds = [f"r1/{part} {kind} 1.5 2" for part, kind in parts]
-        ids = ("state:r1:5", "plan:r2:40.1", "reference::12")
-        self._good = tuple(text.encode() for text in (*kinds, "r2/imu stuck 1", *ids))
+    def change(text: bytes, random: np.random.Generator) -> bytes:
+        return encode(LiveFault(0, 0, damage(text, random).decode("utf-8", "replace")))
 
-    def make(self, random: np.random.Generator) -> bytes:
-        text = damage(choose(self._good, random), random).decode("utf-8", "replace")
-        return encode(LiveFault(0, 0, text))
-
-    def read(self, content: bytes) -> None:
+    def read(content: bytes) -> None:
         text = decode(content, LiveFault).fault
         parse_message_id(text)
         timed = with_time(text, 1 << 40) if len(text.split()) in (2, 3) else text
-        parse_faults(timed, ("r1", "r2"), self._components)
+        parse_faults(timed, ("r1", "r2"), components)
+
+    return Reader(good, read, change)
 
 
-class Drivers:
+def drivers(_folder: Path) -> Reader:
     """What drivers say to an operator, from a page or a program, and what a gamepad does."""
+    rest = standing(load())
+    words = (
+        {"kind": "drive", "vx": 0.1, "vy": 0, "wz": -0.2, "height": 0.3, "held": True},
+        {"kind": "estop", "text": "why", "number": 7},
+        {"kind": "news"},
+    )
 
-    def __init__(self) -> None:
-        self._rest = standing(load())
-        words = (
-            {"kind": "drive", "vx": 0.1, "vy": 0, "wz": -0.2, "height": 0.3, "held": True},
-            {"kind": "estop", "text": "why", "number": 7},
-            {"kind": "news"},
-        )
-        self._good = tuple(json.dumps(word).encode() for word in words)
-
-    def make(self, random: np.random.Generator) -> bytes:
-        return change_json(choose(self._good, random), random)
-
-    def read(self, content: bytes) -> None:
+    def read(content: bytes) -> None:
         pad = Gamepad()
         for at in range(0, len(content) - EVENT_BYTES + 1, EVENT_BYTES):
             pad, _ = take(pad, content[at : at + EVENT_BYTES])
-        wish_of(pad, self._rest)
+        wish_of(pad, rest)
         said = read_driver_word(content)
         assert said.text == printable_line(said.text)
 
+    return Reader(tuple(json.dumps(word).encode() for word in words), read, change_json)
 
-class OperatorAnswers:
+
+def operator_answers(folder: Path) -> Reader:
     """What an operator answers a program of its machine."""
+    path = folder / "team-1.sock"
+    news = {"kind": "news", "driver": "page 1", "modes": {"r1": "walk"}, "number": 3}
+    good = (json.dumps(news).encode() + b"\n", b'{"kind": "heard"}\n{"kind": "estop"}\n')
 
-    def __init__(self, folder: Path) -> None:
-        self._path = folder / "team-1.sock"
-        news = {"kind": "news", "driver": "page 1", "modes": {"r1": "walk"}, "number": 3}
-        self._good = (json.dumps(news).encode() + b"\n", b'{"kind": "heard"}\n{"kind": "estop"}\n')
-
-    def make(self, random: np.random.Generator) -> bytes:
-        return change_json(choose(self._good, random), random)
-
-    def read(self, content: bytes) -> None:
-        self._path.unlink(missing_ok=True)
+    def read(content: bytes) -> None:
+        path.unlink(missing_ok=True)
         with socket.socket(socket.AF_UNIX) as server:
-            server.bind(str(self._path))
+            server.bind(str(path))
             server.listen()
-            with ControlLink(self._path) as link:
+            with ControlLink(path) as link:
                 operator, _ = server.accept()
                 with operator:
                     operator.sendall(content)
                 link.await_stop()
+
+    return Reader(good, read, change_json)

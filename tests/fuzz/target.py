@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Final, Protocol
 
@@ -12,53 +12,38 @@ import numpy as np
 from quadriga.shared.messages import Message
 from tests.fuzz.damage import damage
 
-VALUES: Final = (
+# What texts may hold in the place of anything.
+_ANYWHERE: Final = (
     "9" * 5000,
     "9" * 400,
     "[" * 3000,
     "[" * 3000 + "]" * 3000,
-    "0x" + "f" * 5000,
     "1e999",
-    "nan",
-    "-inf",
+    "1e300",
+    "9223372036854775808",
+    "-1",
     "true",
-    '"\\u0000"',
-    '"\\u001b[2J"',
-    "1979-05-27T07:32:00Z",
-    "{a = 1}",
     "[]",
     '""',
-    "-1",
-    "1e300",
+    '"\\u0000"',
+    '"\\u001b[2J"',
+)
+VALUES: Final = (
+    *_ANYWHERE,
+    "0x" + "f" * 5000,
+    "nan",
+    "-inf",
+    "1979-05-27T07:32:00Z",
+    "{a = 1}",
     '"' + "x" * 5000 + '"',
     "[1, 'a']",
-    "9223372036854775808",
     "'r1:1e999'",
     "'r1:r1:r1'",
     "'0:99999999999999'",
 )
-# What JSON texts and lines of tables may hold in the place of anything.
-_JSON: Final = (
-    "9" * 5000,
-    "9" * 400,
-    "[" * 3000,
-    "[" * 3000 + "]" * 3000,
-    '{"a":' * 3000,
-    "1e999",
-    "NaN",
-    "-1",
-    "null",
-    "true",
-    "[]",
-    "{}",
-    '""',
-    '"\\ud800"',
-    '"\\u0000"',
-    '"\\u001b[2J"',
-    "1e300",
-    "9223372036854775808",
-    "[[1]]",
-)
+_JSON: Final = (*_ANYWHERE, '{"a":' * 3000, "NaN", "null", "{}", '"\\ud800"', "[[1]]")
+
+Change = Callable[[bytes, np.random.Generator], bytes]
 
 
 class Target(Protocol):
@@ -73,44 +58,37 @@ class Target(Protocol):
         ...
 
 
-class FileReader:
-    """A reader of files of one kind.
+@dataclass(frozen=True)
+class Reader:
+    """A reader of one kind.
 
-    Args:
-        path: of the file that is read.
-        good: what such files may hold.
-        read: reads the file; raises an error of the tree, or nothing.
+    Attributes:
+        good: what it is made for.
+        reads: reads bytes; raises an error of the tree, or nothing.
         change: makes an input of a good content; by default damages it.
     """
 
-    def __init__(
-        self,
-        path: Path,
-        good: Sequence[bytes],
-        read: Callable[[Path], object],
-        change: Callable[[bytes, np.random.Generator], bytes] = damage,
-    ) -> None:
-        self._path, self._good, self._read, self._change = path, tuple(good), read, change
+    good: Sequence[bytes]
+    reads: Callable[[bytes], object]
+    change: Change = damage
 
     def make(self, random: np.random.Generator) -> bytes:
-        return self._change(choose(self._good, random), random)
+        return self.change(choose(self.good, random), random)
 
     def read(self, content: bytes) -> None:
-        self._path.write_bytes(content)
-        self._read(self._path)
+        self.reads(content)
 
 
-class Texts:
-    """A reader of bytes that are in memory already."""
+def file_reader(
+    path: Path, good: Sequence[bytes], reads: Callable[[Path], object], change: Change = damage
+) -> Reader:
+    """A reader of files, which stand at `path`."""
 
-    def __init__(self, good: Sequence[bytes], read: Callable[[bytes], object]) -> None:
-        self._good, self._read = tuple(good), read
+    def read(content: bytes) -> None:
+        path.write_bytes(content)
+        reads(path)
 
-    def make(self, random: np.random.Generator) -> bytes:
-        return change_json(choose(self._good, random), random)
-
-    def read(self, content: bytes) -> None:
-        self._read(content)
+    return Reader(good, read, change)
 
 
 def choose(known: Sequence[bytes], random: np.random.Generator) -> bytes:
@@ -120,27 +98,20 @@ def choose(known: Sequence[bytes], random: np.random.Generator) -> bytes:
 
 def change_json(good: bytes, random: np.random.Generator) -> bytes:
     """A JSON text with a value that it should not have, or damaged anyhow."""
-    if random.random() < 0.5:
-        return damage(good, random)
     text = good.decode()
     # What stands between a mark of JSON's and the next: a value, a name, or a part of a text.
     marks = [at for at, letter in enumerate(text) if letter in ":,[]{}"]
-    if len(marks) < 2:
+    if random.random() < 0.5 or len(marks) < 2:
         return damage(good, random)
     begin = int(random.integers(len(marks) - 1))
     value = _JSON[int(random.integers(len(_JSON)))]
     return (text[: marks[begin] + 1] + value + text[marks[begin + 1] :]).encode()
 
 
-def change_toml(lines: Sequence[str], random: np.random.Generator) -> bytes:
-    """A TOML text some of whose lines are missing, or have a value that is none.
-
-    Args:
-        lines: of the good text, see `toml_lines`.
-        random: chooses.
-    """
-    changed = list(lines)
-    for at in random.integers(len(lines), size=int(random.integers(4))):
+def change_toml(good: bytes, random: np.random.Generator) -> bytes:
+    """A TOML text some of whose lines are missing, or have a value that is none."""
+    changed = _toml_lines(good.decode())
+    for at in random.integers(len(changed), size=int(random.integers(4))):
         name, equals, _ = changed[int(at)].partition(" = ")
         value = VALUES[int(random.integers(len(VALUES)))]
         changed[int(at)] = f"{name} = {value}" if equals and random.random() < 0.7 else ""
@@ -148,7 +119,7 @@ def change_toml(lines: Sequence[str], random: np.random.Generator) -> bytes:
     return text if random.random() < 0.7 else damage(text, random)
 
 
-def toml_lines(text: str) -> list[str]:
+def _toml_lines(text: str) -> list[str]:
     """The lines of a TOML text; a value of several lines is one."""
     lines = list[str]()
     for line in text.splitlines():

@@ -1,10 +1,10 @@
-"""Where two sequences of messages differ: to the byte, or by how much."""
+"""Whether agents still do what the golden recording holds, and where they do not."""
 
 from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from itertools import zip_longest
 
 import numpy as np
@@ -17,6 +17,11 @@ from quadriga.shared.topics import topic_of
 TOLERANCE = 1e-6  # of a field's largest magnitude in the recording, for arrays
 
 Packets = Sequence[tuple[str, bytes]]
+
+REMEDY = (
+    "If this change of behaviour is meant, state it and renew the recording:\n"
+    '    python -m tests.golden.renew --reason "what the agents do differently now, and why"'
+)
 
 
 def first_difference(recorded: Packets, recomputed: Packets) -> Difference | None:
@@ -65,3 +70,45 @@ def _decoded(key: str, payload: bytes) -> Message:
 
 def _about(packet: tuple[str, bytes], recorded: str, recomputed: str) -> Difference:
     return Difference(_decoded(*packet).tick, packet[0], "", recorded, recomputed)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """`ok`, and one sentence or a few."""
+
+    ok: bool
+    text: str
+
+
+def judge(robot: str, recorded: Packets, recomputed: Packets, unlike: Sequence[str]) -> Verdict:
+    """Compare to the byte; within `TOLERANCE` where other machines may differ in the last bits.
+
+    Args:
+        robot: whose messages these are.
+        recorded: keys and payloads.
+        recomputed: the same of the present code.
+        unlike: in what the arithmetic here is not that of the machine that recorded.
+    """
+    difference = first_difference(recorded, recomputed)
+    if difference is None:
+        return Verdict(True, f"{robot}: all {len(recorded)} messages equal to the byte")
+    deviations = largest_deviations(recorded, recomputed)
+    field = max(deviations, key=lambda name: deviations[name])
+    largest = f"largest deviation {deviations[field]:.1e} in {field}"
+    if unlike and deviations[field] <= TOLERANCE:
+        return Verdict(
+            True,
+            (
+                f"{robot}: {len(recorded)} messages equal within {TOLERANCE:g}, not to the byte "
+                f"({largest}), since this machine computes with {'; '.join(unlike)}"
+            ),
+        )
+    elsewhere = f"\nThis machine computes with {'; '.join(unlike)}." if unlike else ""
+    return Verdict(
+        False,
+        (
+            f"The agent of {robot} no longer does what the golden recording holds.\n"
+            f"First difference: {difference}\n{largest}, relative to its largest magnitude."
+            f"{elsewhere}\n{REMEDY}"
+        ),
+    )

@@ -21,10 +21,9 @@ from quadriga.shared.messages import Command, Message, State
 from quadriga.shared.recording.reader import ChunkEntry, Recording
 from quadriga.shared.runtime.arithmetic import arithmetic, differences
 from tests.golden import scenario
-from tests.golden.compare import TOLERANCE, first_difference
+from tests.golden.compare import REMEDY, TOLERANCE, first_difference, judge
 from tests.golden.renew import ARITHMETIC, note, write
 from tests.golden.rerun import recorded, rerun
-from tests.golden.verdict import REMEDY, judge
 
 CONFIG = scenario.config()
 ROBOTS = ("r1", "r2")
@@ -119,17 +118,8 @@ def test_what_another_machine_may_do_to_the_last_bits_is_let_through_and_told() 
 
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="names a kernel of x86")
 def test_on_a_processor_of_2008_the_walk_is_the_same_within_the_tolerance() -> None:
-    command = [
-        sys.executable,
-        "-m",
-        "pytest",
-        "-q",
-        "-p",
-        "no:cacheprovider",
-        "-k",
-        "do_what",
-        __file__,
-    ]
+    options = ("-q", "-p", "no:cacheprovider", "-k", "do_what")
+    command = [sys.executable, "-m", "pytest", *options, __file__]
     environment = {**os.environ, "OPENBLAS_CORETYPE": "Nehalem"}
     done = subprocess.run(command, capture_output=True, text=True, timeout=120, env=environment)
     assert done.returncode == 0, done.stdout

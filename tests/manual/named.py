@@ -6,24 +6,18 @@ import argparse
 import re
 from collections.abc import Callable, Mapping
 from importlib.metadata import metadata
-from pathlib import Path
 from typing import Final
 
-from quadriga.commands import fault, record
+from quadriga.commands import fault
 from quadriga.experiments.published.catalogue import list_names
-from quadriga.experiments.seeds import parse_seeds
-from quadriga.experiments.sweep import parse_sweep
-from quadriga.experiments.tuning.tuning_file import read_tuning
-from quadriga.experiments.variants import PREDICTORS, combine_with_predictors, parse_variants
+from quadriga.experiments.variants import combine_with_predictors, parse_variants
 from quadriga.faults.catalogue import ALL, select_faults
-from quadriga.playback.timeline import parse_remap
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.runtime.places import SOURCE
 from quadriga.sim_server.world.faults import build_components, parse_faults, with_time
-from quadriga.stop_times.ways import WAYS
 from quadriga.team import scenarios
 
 # Folders of the checkout that pages name files of.
@@ -72,18 +66,12 @@ def _check_campaign(arguments: argparse.Namespace, _config: Config) -> None:
         load(None, {**variant.keys, "identification.response": ""})
     for name in arguments.scenarios:
         scenarios.path(name)
-    if arguments.seeds is not None:
-        parse_seeds("--seeds", arguments.seeds)
-    for sweep in arguments.sweep:
-        parse_sweep(sweep)
 
 
 def _check_experiments(arguments: argparse.Namespace, _config: Config) -> None:
     for name in arguments.names:
         if not name.endswith(".toml") and name not in list_names():
             raise ConfigError("experiments", repr(name), f"one of {', '.join(list_names())}")
-    if arguments.seeds is not None:
-        parse_seeds("--seeds", arguments.seeds)
 
 
 def _check_fault(arguments: argparse.Namespace, config: Config) -> None:
@@ -95,55 +83,12 @@ def _check_fault(arguments: argparse.Namespace, config: Config) -> None:
         select_faults([ALL] if arguments.table else fault._names_of(arguments), config)
 
 
-def _check_probe(arguments: argparse.Namespace, _config: Config) -> None:
-    for name in _split(arguments.predictors):
-        if name not in PREDICTORS:
-            raise ConfigError("--predictors", repr(name), f"names of {', '.join(PREDICTORS)}")
-
-
-def _check_play(arguments: argparse.Namespace, _config: Config) -> None:
-    for text in arguments.remap:
-        parse_remap(text)
-
-
-def _check_record(arguments: argparse.Namespace, _config: Config) -> None:
-    record._selection(arguments)
-
-
-def _check_tune(arguments: argparse.Namespace, _config: Config) -> None:
-    if arguments.file != Path("FILE"):  # in its place stands any
-        read_tuning(arguments.file)
-
-
-def _check_bench_stop(arguments: argparse.Namespace, _config: Config) -> None:
-    for way in arguments.ways:
-        if way not in WAYS:
-            raise ConfigError("way", repr(way), f"one of {', '.join(WAYS)}")
-
-
-def _check_sim(arguments: argparse.Namespace, config: Config) -> None:
-    if arguments.emulated and arguments.emulated != config.team.robot:
-        raise ConfigError("--as", repr(arguments.emulated), repr(config.team.robot))
-
-
-def _check_certs(arguments: argparse.Namespace, _config: Config) -> None:
-    if arguments.action != "renew" and arguments.names:
-        raise ConfigError("NAME", " ".join(arguments.names), f"those that {arguments.action} takes")
-
-
 def _split(text: str) -> list[str]:
     return [name.strip() for name in text.split(",") if name.strip()]
 
 
 _CHECKS: Final[Mapping[str, Callable[[argparse.Namespace, Config], None]]] = {
-    "bench-stop": _check_bench_stop,
     "campaign": _check_campaign,
-    "certs": _check_certs,
     "experiments": _check_experiments,
     "fault": _check_fault,
-    "play": _check_play,
-    "probe": _check_probe,
-    "record": _check_record,
-    "sim": _check_sim,
-    "tune": _check_tune,
 }

@@ -10,7 +10,7 @@ import pytest
 
 from quadriga.shared.errors import QuadrigaError
 from quadriga.shared.runtime.places import SOURCE
-from tests.manual.blocks import Block, all_blocks, find_blocks, find_spans, find_texts, list_pages
+from tests.manual.blocks import Block, all_blocks, find_spans, find_texts, list_pages
 from tests.manual.named import check_places, is_place
 from tests.manual.programs import check_command, check_mention
 from tests.manual.shell import split_commands
@@ -75,33 +75,22 @@ def test_commands_stand_in_blocks_that_say_so() -> None:
     [
         ("quadriga wlak", "got 'wlak'"),
         ("quadriga walk --robts 3", "--robts"),
-        ("quadriga walk --set world.sed=3", "world.sed"),
         ("quadriga walk --robots 11", "team.robots: got 11"),
         (".venv/bin/quadriga walk --scenario gravle-3", "gravle-3"),
         ("quadriga bridge --armed", ""),  # of which robot?
         ("quadriga campaign flat --planners 'a:planner.knd=none'", "planner.knd"),
-        ("quadriga campaign flat --seeds x", "--seeds"),
         ("quadriga campaign flta", "flta"),
-        ("quadriga campaign flat --predictors rigde", "rigde"),
         ("quadriga experiments hrad", "hrad"),
-        ("quadriga fault agent-kiled", "agent-kiled"),
         ("quadriga fault r2/imu stcuk --at 4", "stcuk"),
-        ("quadriga fault r9/imu stuck --live", "r9"),
-        ("quadriga agent --robot r9", "r9"),
-        ("quadriga sim --as go2", "--as"),
-        ("quadriga certs revoke", "revoke"),
         ("quadriga walk --config deploy/dekc.toml", "no file deploy/dekc.toml"),
         ("pip install -e '.[campain]'", "no extra campain"),
         ("quadriga config | grpe seed", "grpe"),
         ("make wlak", "no target wlak"),
         ("make walk ARGS='--robts 3'", "--robts"),
-        ("make bench ARGS=--quik", "no option --quik"),
         ("make lint ARGS=--fix", "no ARGS of lint"),
         ("python -m quadriga.nothing", ""),
-        ("python -m tests.golden.renew --resaon x", "no option --resaon"),
         ("docker compose exec operator quadriga estp", "estp"),
         ("docker compose exec oprator quadriga estop", "no service oprator"),
-        ("docker compose run --rm certs rnew", ""),
         ("podman cp quadriga_recoder_1:/work/runs/. runs", "no service recoder"),
     ],
 )
@@ -119,21 +108,6 @@ def test_what_programs_that_are_not_run_import_is_there() -> None:
             if isinstance(node, ast.ImportFrom):
                 module = import_module(str(node.module))
                 assert [one.name for one in node.names if not hasattr(module, one.name)] == []
-
-
-def test_a_block_is_found_with_what_is_said_of_it() -> None:
-    text = "# A\n\n<!-- not run: hours -->\n```sh\nmake bench\n```\n\n```python\nx = 1\n```\n"
-    slow, program = find_blocks(text, "a.md")
-    assert (slow.line, slow.marker, slow.said, slow.text) == (5, "not run", "hours", "make bench\n")
-    assert (program.language, program.marker) == ("python", "")
-
-
-def test_a_line_is_cut_into_its_commands() -> None:
-    text = (
-        "A=1 make \\\n  walk  # ends\n(quadriga walk 2>&1 || true) | grep 'a b' > out\nwait $! &\n"
-    )
-    found = [" ".join(words) for words in split_commands(text)]
-    assert found == ["make walk", "true", "grep a b", "wait $!"]
 
 
 def test_what_is_not_run_says_why() -> None:

@@ -11,13 +11,12 @@ from typing import Any, Final
 import pytest
 
 from quadriga.commands.parser import main
-from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.runtime.places import SOURCE
+from tests.listening import WAIT, await_true
 from tests.manual.blocks import EXCERPT, LIVE, NOT_RUN, RUN_ELSEWHERE, SHORT, Block, all_blocks
 from tests.manual.shell import split_commands
 from tests.manual.short_forms import run_live, run_short, run_with
 
-WAIT: Final = 60.0  # s, until a team walks
 RUN: Final = "RUN"  # what pages call a run folder
 CONFIG: Final = "team.toml"  # and the reader's configuration, here that by default
 ENDS: Final = ("stop",)  # the walk of the live team
@@ -37,6 +36,7 @@ def commands_of(block: Block) -> list[list[str]]:
     return [words[1:] for words in commands]
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("page", PAGES)
 def test_the_blocks_of_a_page_run(
     page: str, request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -61,15 +61,13 @@ def test_the_blocks_of_a_page_run(
                 run_short(words)
 
 
+@pytest.mark.nightly
 def test_the_commands_to_a_live_team_run(
     live_team: subprocess.Popen[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     """One after the other, as pages show them, and at last the one that ends the walk."""
-    deadline = monotonic() + WAIT
-    while "walk" not in _modes(capsys):
-        assert live_team.poll() is None
-        assert monotonic() < deadline, "nobody walks"
-        sleep(0.2)
+    await_true(lambda: "walk" in _modes(capsys) or live_team.poll() is not None)
+    assert live_team.poll() is None
     for words in dict.fromkeys(tuple(words) for b in LIVE_BLOCKS for words in commands_of(b)):
         if words != ENDS:
             run_live(words)

@@ -1,18 +1,33 @@
-"""Packages that add a kind of planner, put together in a folder that is imported from."""
+"""Packages that add to quadriga: those of this folder, and such as a test puts together."""
 
 from __future__ import annotations
 
+import os
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from quadriga.shared.planner_kinds import GROUP
+from quadriga.shared.runtime.places import SOURCE
 
 ONE = """
 from quadriga.shared.planner_kinds import PlannerKind
 
 KIND = PlannerKind({arguments})
 """
+
+
+def install_package(name: str, folder: Path) -> str:
+    """Install a package of `tests/plugins` with pip; the PYTHONPATH of processes that find it."""
+    source, target = folder / "source", str(folder / "installed")
+    ignored = shutil.ignore_patterns("__pycache__")
+    shutil.copytree(SOURCE / "tests" / "plugins" / name, source, ignore=ignored)
+    flags = ("--quiet", "--no-deps", "--no-index", "--no-build-isolation", "--target", target)
+    subprocess.run([sys.executable, "-m", "pip", "install", *flags, str(source)], check=True)
+    return os.pathsep.join(filter(None, (target, os.environ.get("PYTHONPATH"))))
 
 
 def install_module(

@@ -8,7 +8,6 @@ from __future__ import annotations
 import os
 import re
 import shlex
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -16,20 +15,13 @@ from pathlib import Path
 import pytest
 
 from quadriga.shared.messages import Plan
+from quadriga.shared.recording.reader import Recording
+from tests.plugins.kinds import install_package
+from tests.runtime.conftest import run_command
 
+pytestmark = pytest.mark.nightly
 TOP = Path(__file__).parents[2]
 PACKAGE = "tests/plugins/balance"
-PIP = (
-    sys.executable,
-    "-m",
-    "pip",
-    "install",
-    "--quiet",
-    "--no-deps",
-    "--no-index",
-    "--no-build-isolation",
-    "--disable-pip-version-check",
-)
 
 
 def documented_commands() -> list[list[str]]:
@@ -45,17 +37,13 @@ class Place:
 
     def __init__(self, folder: Path) -> None:
         self.folder, self.target = folder, folder / "installed"
-        source = folder / "source"
-        shutil.copytree(TOP / PACKAGE, source, ignore=shutil.ignore_patterns("__pycache__"))
-        done = self.run(*PIP, "--target", str(self.target), str(source))
-        assert done.returncode == 0, done.stderr
+        self._path = install_package("balance", folder)
 
     def run(self, *words: str) -> subprocess.CompletedProcess[str]:
-        path = os.pathsep.join(filter(None, (str(self.target), os.environ.get("PYTHONPATH"))))
         return subprocess.run(
             words,
             cwd=self.folder,
-            env={**os.environ, "PYTHONPATH": path},
+            env={**os.environ, "PYTHONPATH": self._path},
             check=False,
             capture_output=True,
             text=True,
@@ -85,59 +73,30 @@ def said(place: Place) -> dict[str, str]:
     return found
 
 
-def test_the_package_is_small() -> None:
-    files = [*(TOP / PACKAGE).rglob("*.py")]
-    assert 0 < sum(len(file.read_text(encoding="utf-8").splitlines()) for file in files) < 60
-
-
-def test_the_documented_commands_succeed(said: dict[str, str]) -> None:
+def test_the_documented_commands_know_it(place: Place, said: dict[str, str]) -> None:
     assert {*said} == {"walk", "info", "check", "replay", "campaign"}
-
-
-def test_its_plans_are_recorded_and_the_recording_names_it(
-    place: Place, said: dict[str, str]
-) -> None:
-    from quadriga.shared.recording.reader import Recording
-
-    recording = Recording(place.folder / "runs" / "balance" / "run.mcap")
-    plans = [*recording.messages(Plan, "r2")]
+    plans = [*Recording(place.folder / "runs" / "balance" / "run.mcap").messages(Plan, "r2")]
     assert len(plans) > 20
     assert any((abs(plan.u) > 0).any() for plan in plans)
     assert re.search(r"quadriga-balance 0\.1\.0 [0-9a-f]{16}", said["info"])
-
-
-def test_its_recording_is_checked_and_replayed_to_the_byte(said: dict[str, str]) -> None:
     assert "FAIL" not in said["check"]
     assert re.search(r"ok +delay +.*plans", said["check"])
     for robot in ("r1", "r2"):
         assert re.search(rf"{robot}: .*plan.* equal to the byte", said["replay"])
-
-
-def test_what_it_does_differs_from_no_planner(place: Place, said: dict[str, str]) -> None:
     rows = (place.folder / "runs" / "compared" / "trials.csv").read_text(encoding="utf-8")
     assert rows.count(",balance,") == rows.count(",none,") == 1
     assert "balance" in said["campaign"]
 
 
-def test_without_the_package_a_recording_says_what_is_missing(
-    place: Place, said: dict[str, str]
-) -> None:
-    assert said
+@pytest.mark.usefixtures("said")
+def test_without_the_package_a_recording_says_what_is_missing(place: Place) -> None:
     recording = str(place.folder / "runs" / "balance" / "run.mcap")
-    for words, status in (("check", 0), ("replay", 2)):
-        done = subprocess.run(
-            [sys.executable, "-m", "quadriga", words, recording, *["--all"][: status // 2]],
-            check=False,
-            capture_output=True,
-            text=True,
-            timeout=100,
-        )
-        assert done.returncode == status
-    assert (
-        "planner.kind: got 'balance', expected an installed kind (install quadriga-balance"
-        in done.stderr
-    )
-    assert "install quadriga-balance 0.1.0" in done.stderr
+    assert run_command("check", recording)[0] == 0
+    status, errors = run_command("replay", recording, "--all")
+    assert status == 2
+    missing = "planner.kind: got 'balance', expected an installed kind (install quadriga-balance"
+    assert missing in errors
+    assert "install quadriga-balance 0.1.0" in errors
 
 
 def test_its_options_are_checked(place: Place) -> None:
@@ -155,27 +114,18 @@ def test_it_keeps_the_contract_of_all_planners(place: Place) -> None:
     assert len(re.findall(r"balance\] PASSED", done.stdout)) >= 8
 
 
-@pytest.fixture(scope="module")
-def edited(place: Place, said: dict[str, str]) -> Place:
-    """The same with other code of the same version installed."""
-    assert said
+@pytest.mark.usefixtures("said")
+def test_other_code_of_the_same_version_is_noticed(place: Place) -> None:
+    """By a campaign, which does not go on with it, and by a replay, which differs and says why."""
     file = place.target / "quadriga_balance" / "planner.py"
     before = file.read_text(encoding="utf-8")
     after = before.replace("0.8 * errors + 0.2", "0.7 * errors + 0.3")
     assert after != before
     file.write_text(after, encoding="utf-8")
-    return place
-
-
-def test_a_campaign_does_not_go_on_with_other_code_of_it(edited: Place) -> None:
-    _, command, *options = documented_commands()[-1]
-    done = edited.quadriga(command, *options)
+    done = place.quadriga(*documented_commands()[-1][1:])
     assert done.returncode != 0
     assert "trials of planner or controller quadriga-balance 0.1.0 " in done.stderr
-
-
-def test_a_replay_with_other_code_of_it_differs_and_says_why(edited: Place) -> None:
-    done = edited.quadriga("replay", "runs/balance/run.mcap", "--robot", "r1")
+    done = place.quadriga("replay", "runs/balance/run.mcap", "--robot", "r1")
     assert done.returncode == 1
     assert "first difference: " in done.stdout
     assert re.search(

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import hashlib
+import os
 import subprocess
 import sys
+from collections import defaultdict
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 from rich.console import Console
@@ -15,24 +21,28 @@ from benchmarks.slow_motion import in_slow_motion
 from quadriga.replay.outcome import format_outcome
 from quadriga.replay.team_replay import replay
 from quadriga.shared.bus.session import Bus
+from quadriga.shared.codec import decode
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
+from quadriga.shared.errors import MessageError
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.robots.conventions import robot_names
-from quadriga.shared.runtime.clock import monotonic, sleep
+from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.topic import Topic
+from quadriga.shared.topics import TRUTH
 from quadriga.team.endpoint import free_endpoint
-from quadriga.team.launch import Launch, ProcessSpec, process_table
+from quadriga.team.launch import QUADRIGA, Launch, ProcessSpec, process_table
 from quadriga.warm_up import warm_up
+from tests.listening import WAIT, await_true
 
 BEGUN = "0 ms: start "  # in the log of a plant that drives time: all are there, and walk
-WAIT = 60.0  # s, more than anything here takes on a busy machine
 # Less than a team collects by default, which takes minutes; for all tests the same, so that they
 # collect but once.
 DATA = {"identification.seconds": 60.0}
 REAL_TIME = "realtime"
 SPEED = 0.35  # of teams in real time: a slow computer keeps up with two robots
+FOREVER = 600.0  # s of world time
 
 
 @dataclass(frozen=True)
@@ -42,24 +52,26 @@ class Team:
     config: Config
     folder: Path
 
+    @property
+    def file(self) -> str:
+        """The configuration, written."""
+        path = self.folder / "config.toml"
+        path.write_text(to_toml(self.config), encoding="utf-8")
+        return str(path)
+
     def rows(self, *, standing: bool = True) -> tuple[ProcessSpec, ...]:
         """The launcher's table, with agents that merely stand if asked for.
 
         Real time is kept in slow motion.
         """
-        (self.folder / "config.toml").write_text(to_toml(self.config), encoding="utf-8")
+        file = self.file
         rows = process_table(self.config, self.folder, None, "")
-        rows = tuple(self._standing(row) if standing else row for row in rows)
+        if standing:
+            names = robot_names(self.config.team.robots)
+            rows = tuple(_standing(row, file) if row.name in names else row for row in rows)
         if self.config.world.mode == REAL_TIME:
             return tuple(in_slow_motion(row, SPEED) for row in rows)
         return rows
-
-    def _standing(self, row: ProcessSpec) -> ProcessSpec:
-        if row.name not in robot_names(self.config.team.robots):
-            return row
-        module = (sys.executable, "-m", "tests.runtime.standing_agent")
-        file = str(self.folder / "config.toml")
-        return replace(row, command=(*module, "--config", file, "--robot", row.name))
 
     def launch(self, *, standing: bool = True) -> Launch:
         """Start the processes."""
@@ -71,10 +83,7 @@ class Team:
 
     def await_log(self, name: str, text: str) -> None:
         """Wait until a process has said something."""
-        deadline = monotonic() + WAIT
-        while text not in self.log(name):
-            assert monotonic() < deadline, f"{name} never said {text!r}: {self.log(name)}"
-            sleep(0.02)
+        await_true(lambda: text in self.log(name), lambda: f"no {text!r}: {self.log(name)}")
 
     def run(self, *, standing: bool = True) -> Recording:
         """Walk to the end; the recording, if there is a recorder."""
@@ -94,33 +103,38 @@ class Team:
 
 
 Make = Callable[..., Team]
+Watcher = Callable[..., Bus]
+
+
+def _standing(row: ProcessSpec, file: str) -> ProcessSpec:
+    words = ("-m", "tests.runtime.standing_agent", "--config", file, "--robot", row.name)
+    return replace(row, command=(sys.executable, *words))
+
+
+def build_team(folder: Path, **keys: object) -> Team:
+    """A team of a test's own; keyword `section__key` sets a key."""
+    given = {
+        "team.robots": 2,
+        "planner.kind": "none",
+        "bus.endpoint": free_endpoint(),
+        "bus.barrier_timeout": WAIT,
+        # A machine that runs other tests stalls.
+        "bus.clock_timeout": 5.0,
+        "world.command_damp_ms": 2000,
+        "world.mode": "lockstep",
+        "recorder.enabled": False,
+        "runtime.check_cpu": False,  # robots that walk late will do
+    }
+    keys = {name.replace("__", "."): value for name, value in keys.items()}
+    return Team(load(None, given | keys), folder)
 
 
 @pytest.fixture
 def make_team(tmp_path: Path, request: pytest.FixtureRequest) -> Make:
-    """A function that makes a team of a test's own; keyword `section__key` sets a key.
-
-    Real time is kept by one test's team at a time, beside no other test.
-    """
-
-    def make(**keys: object) -> Team:
-        given = {
-            "team.robots": 2,
-            "planner.kind": "none",
-            "bus.endpoint": free_endpoint(),
-            "bus.barrier_timeout": WAIT,
-            # A machine that runs other tests stalls.
-            "bus.clock_timeout": 5.0,
-            "world.command_damp_ms": 2000,
-            "recorder.enabled": False,
-            "runtime.check_cpu": False,  # robots that walk late will do
-        }
-        keys = {"world.mode": "lockstep"} | {n.replace("__", "."): v for n, v in keys.items()}
-        if keys["world.mode"] == REAL_TIME:
-            request.getfixturevalue("_alone")
-        return Team(load(None, given | keys), tmp_path)
-
-    return make
+    """`build_team` for a folder of the test's own; at night processes have their priority."""
+    if request.node.get_closest_marker("nightly"):
+        request.getfixturevalue("_realtime")
+    return partial(build_team, tmp_path)
 
 
 @pytest.fixture(scope="session")
@@ -130,7 +144,7 @@ def _compiled() -> None:
 
 
 @pytest.fixture
-def watcher() -> Iterator[Callable[..., Bus]]:
+def watcher() -> Iterator[Watcher]:
     """A function that puts a bus on a team's network that hears everything, or some topics.
 
     In real time what somebody does not take in soon enough is dropped: on a busy machine a test
@@ -151,7 +165,53 @@ def watcher() -> Iterator[Callable[..., Bus]]:
         bus.close()
 
 
-def run_alone(row: ProcessSpec) -> tuple[int, str]:
-    """Run one row's command to its end: exit status and what it said on stderr."""
-    done = subprocess.run(row.command, capture_output=True, text=True, timeout=WAIT, check=False)
+def await_packet(bus: Bus, wanted: Callable[[str, bytes], object]) -> None:
+    """Wait until something is heard, of what there is on the bus."""
+    deadline = monotonic() + WAIT
+    while (packet := bus.get(1.0)) is None or not wanted(*packet):
+        assert monotonic() < deadline, "it is never heard"
+
+
+def await_tick(bus: Bus, tick: int, topic: Topic = TRUTH) -> int:
+    """The time of a topic, as soon as it is `tick` or later."""
+    now = -1
+
+    def is_late_enough(key: str, payload: bytes) -> bool:
+        nonlocal now
+        if key == topic.key(bus.team):
+            with suppress(MessageError):
+                now = decode(payload, topic.type).tick
+        return now >= tick
+
+    await_packet(bus, is_late_enough)
+    return now
+
+
+def digests(recording: Recording) -> dict[str, str]:
+    """Digest of the payloads of every key, in order; `status` carries wall-clock times."""
+    found: dict[str, Any] = defaultdict(hashlib.sha256)
+    for entry in recording.entries():
+        if not entry.key.endswith("/status"):
+            found[entry.key].update(len(entry.payload).to_bytes(4) + entry.payload)
+    return {key: digest.hexdigest() for key, digest in found.items()}
+
+
+@contextmanager
+def router(listen: str, *options: str, says: str = "routing at") -> Iterator[subprocess.Popen[str]]:
+    """The process of a router, once it has said that it listens; with `says=""` at once."""
+    words = ("router", "--listen", listen, *options, "--parent", str(os.getpid()))
+    with subprocess.Popen((*QUADRIGA, *words), stderr=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stderr
+            assert not says or says in process.stderr.readline()
+            yield process
+        finally:
+            process.kill()
+
+
+def run_command(*words: str) -> tuple[int, str]:
+    """Run a command of `quadriga` to its end: exit status and what it said on stderr."""
+    done = subprocess.run(
+        (*QUADRIGA, *words), capture_output=True, text=True, timeout=WAIT, check=False
+    )
     return done.returncode, done.stderr

@@ -40,20 +40,8 @@ def computers(names: Sequence[str]) -> Iterator[dict[str, str]]:
         for number, name in enumerate(names, 1):
             own, addresses[name] = _add(stack, name), f"10.77.0.{number}"
             port = f"port{number}"
-            _ip(
-                "link",
-                "add",
-                "eth0",
-                "netns",
-                own,
-                "type",
-                "veth",
-                "peer",
-                "name",
-                port,
-                "netns",
-                switch,
-            )
+            link = f"link add eth0 netns {own} type veth peer name {port} netns {switch}"
+            _ip(*link.split())
             _ip("-n", switch, "link", "set", port, "master", "bridge", "up")
             _ip("-n", own, "addr", "add", f"{addresses[name]}/{_MASK}", "dev", "eth0")
             _ip("-n", own, "link", "set", "eth0", "up")

@@ -1,12 +1,17 @@
 """A legitimate agent of the contract that merely stands: PD around the standing pose.
 
 Run: python -m tests.runtime.standing_agent --config FILE --robot NAME [--parent PID]
+
+As `team.agent_command` it is told how each robot fails after 100 ms of that:
+python tests/runtime/standing_agent.py r1=slow r2=nan, or ticks, or silent.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -19,17 +24,35 @@ from quadriga.shared.errors import MessageError
 from quadriga.shared.members import has_lead
 from quadriga.shared.messages import Command, Event, State
 from quadriga.shared.robots.conventions import N_JOINTS
+from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.runtime.scheduling import take_priority
 from quadriga.shared.runtime.signals import die_with_parent, stop_on_signals
 from quadriga.shared.topics import COMMAND, EVENT, STATE
-from tests.a1 import q_stand
+
+WELL: Final = 100  # ms
+SLOW: Final = 2e-3  # s, for an answer
+AHEAD: Final = 1000  # ms
 
 
-def run(config: Config, robot: str) -> None:
+def answer(config: Config, tick: int, way: str) -> bytes | None:
+    """The command that answers the state of a tick; None: there is none."""
+    zero, kp, kd = np.zeros(N_JOINTS), np.full(N_JOINTS, 80.0), np.full(N_JOINTS, 3.0)
+    command = Command(tick, 10**6 * tick, zero, config.robot.q_stand, zero, kp, kd)
+    if way == "slow":
+        sleep(SLOW)
+    if way in ("", "slow") or tick < WELL:
+        return encode(command)
+    if way == "silent":
+        return None
+    if way == "ticks":
+        return encode(Command(tick + AHEAD, 10**6 * tick, zero, config.robot.q_stand, zero, kp, kd))
+    return encode(Command.from_row(tick, 10**6 * tick, np.full(5 * N_JOINTS, np.nan)))
+
+
+def run(config: Config, robot: str, way: str) -> None:
     """Answer the newest state until the walk is over."""
     stopped = stop_on_signals()
     team, ended = config.team.name, False
-    zero, kp, kd = np.zeros(N_JOINTS), np.full(N_JOINTS, 80.0), np.full(N_JOINTS, 3.0)
     with Bus.open(config.bus, team, robot, stopped) as bus:
         bus.subscribe(STATE.key(team, robot))
         bus.subscribe(EVENT.key(team))
@@ -52,17 +75,18 @@ def run(config: Config, robot: str) -> None:
                         newest = decode(payload, State)
                 except MessageError as error:
                     print(error, flush=True)
-            if newest is not None:
-                tick = newest.tick
-                put(encode(Command(tick, 10**6 * tick, zero, q_stand(), zero, kp, kd)))
+            if newest is not None and (sent := answer(config, newest.tick, way)) is not None:
+                put(sent)
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser()
-    parser.add_argument("--config", type=Path, required=True)
-    parser.add_argument("--robot", required=True)
+    parser.add_argument("ways", nargs="*")
+    parser.add_argument("--config", type=Path, default=os.environ.get("QUADRIGA_CONFIG"))
+    parser.add_argument("--robot", default=os.environ.get("QUADRIGA_ROBOT"))
     parser.add_argument("--parent", type=int)
-    arguments = parser.parse_args()
-    if arguments.parent:
-        die_with_parent(arguments.parent)
-    run(load(arguments.config), arguments.robot)
+    given = parser.parse_args()
+    if given.parent:
+        die_with_parent(given.parent)
+    ways = dict(word.split("=") for word in given.ways)
+    run(load(Path(given.config)), given.robot, ways.get(given.robot, ""))

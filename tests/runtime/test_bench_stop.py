@@ -16,7 +16,8 @@ OPTIONS = (
 )
 
 
-@pytest.mark.usefixtures("_alone", "_compiled")
+@pytest.mark.nightly
+@pytest.mark.usefixtures("_realtime", "_compiled")
 def test_a_press_is_timed_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file, folder = tmp_path / "stops.json", tmp_path / "out"
     words = ["bench-stop", *WAYS, *OPTIONS, "--json", str(file), "--out", str(folder)]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,13 +21,12 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.messages import EStop, Event, Measurement
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.topics import ESTOP
 from quadriga.team.endpoint import free_endpoint
+from quadriga.team.launch import QUADRIGA
 from tests.bridges.test_udp_driver import HOST, free_port
-from tests.runtime.conftest import WAIT
+from tests.listening import WAIT, await_true
 
-QUADRIGA = (sys.executable, "-m", "quadriga")
 # A machine that runs other tests stalls longer than a robot's may.
 PATIENT: dict[str, Any] = {
     "runtime.priority": "ordinary",  # else two of them leave nothing to the other processes
@@ -40,7 +39,7 @@ PATIENT: dict[str, Any] = {
     "bridge.speed_share": 1.5,
 }
 
-pytestmark = pytest.mark.usefixtures("_alone", "_compiled")
+pytestmark = [pytest.mark.nightly, pytest.mark.usefixtures("_realtime", "_compiled")]
 
 
 @pytest.fixture
@@ -80,11 +79,9 @@ def robots(config: Config, file: Path, tmp_path: Path) -> Iterator[subprocess.Po
         command = [*QUADRIGA, "sim", "--as", config.team.robot, "--config", str(file)]
         command += ["--parent", str(os.getpid())]
         process = subprocess.Popen(command, stdout=out, stderr=subprocess.STDOUT)
-    deadline = monotonic() + WAIT
-    while "on the network" not in log.read_text(encoding="utf-8"):
-        assert process.poll() is None, log.read_text(encoding="utf-8")
-        assert monotonic() < deadline
-        sleep(0.05)
+    said = partial(log.read_text, encoding="utf-8")
+    await_true(lambda: "on the network" in said() or process.poll() is not None, said)
+    assert process.poll() is None, said()
     yield process
     process.kill()
     process.wait()
@@ -142,15 +139,15 @@ def test_a_bridge_hears_the_emergency_stop_whatever_its_agent_does(
     command += ["--armed", "--seconds", "60"]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as walking:
         said = out / "logs" / "plant_r1.log"
-        wait_until(lambda: said.is_file() and "r1: walk" in said.read_text(encoding="utf-8"))
+        await_true(lambda: said.is_file() and "r1: walk" in said.read_text(encoding="utf-8"))
         agent = process_of(out, "r1")
         with Bus.open(config.bus, config.team.name, members.ESTOP) as bus:
             put = bus.publisher(ESTOP.key(config.team.name))
-            wait_until(lambda: "r1" in bus.members_at(HERE))
+            await_true(lambda: "r1" in bus.members_at(HERE))
             os.kill(agent, signal.SIGSTOP)
             put(encode(EStop(0, 0, "dog")))  # long before the agent's silence stops the robot
-        wait_until(lambda: "r1: estop " in said.read_text(encoding="utf-8"))
-        wait_until(lambda: motors_of(log)[-1] == "motors off")
+        await_true(lambda: "r1: estop " in said.read_text(encoding="utf-8"))
+        await_true(lambda: motors_of(log)[-1] == "motors off")
         os.kill(agent, signal.SIGKILL)
         walking.terminate()
     assert "r1: estop estop:dog" in said.read_text(encoding="utf-8")
@@ -195,16 +192,16 @@ def test_a_bridge_that_dies_or_hangs_leaves_a_robot_that_is_damped_and_then_pass
     command += ["--armed", "--seconds", "60"]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as walking:
         said = out / "logs" / "plant_r1.log"
-        wait_until(lambda: said.is_file() and "r1: walk" in said.read_text(encoding="utf-8"))
+        await_true(lambda: said.is_file() and "r1: walk" in said.read_text(encoding="utf-8"))
         assert motors_of(log)[-1] == "motors driven"
         bridge = process_of(out, "plant_r1")
         os.kill(bridge, number)
-        wait_until(lambda: motors_of(log)[-1] == "motors off")
+        await_true(lambda: motors_of(log)[-1] == "motors off")
         assert motors_of(log)[-3:] == ["motors driven", "motors damped", "motors off"]
-        wait_until(lambda: watchdogs() <= before)  # it leaves by itself
+        await_true(lambda: watchdogs() <= before)  # it leaves by itself
         if number is signal.SIGSTOP:
             os.kill(bridge, signal.SIGCONT)
-            wait_until(lambda: "r1: estop " in said.read_text(encoding="utf-8"))
+            await_true(lambda: "r1: estop " in said.read_text(encoding="utf-8"))
         walking.terminate()
 
 
@@ -212,10 +209,3 @@ def motors_of(log: Path) -> list[str]:
     """What the simulated robots have said of the motors of r1."""
     said = (line.partition("r1 ")[2] for line in log.read_text(encoding="utf-8").splitlines())
     return [text for text in said if text.startswith("motors ")]
-
-
-def wait_until(happens: Callable[[], bool]) -> None:
-    deadline = monotonic() + WAIT
-    while not happens():
-        assert monotonic() < deadline
-        sleep(0.02)

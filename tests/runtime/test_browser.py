@@ -18,13 +18,14 @@ from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.topics import REFERENCE, STATUS
 from quadriga.team.launch import Launch
 from tests.browser import CHROMIUM, WHY_NOT, Browser, Page, browser
-from tests.runtime.conftest import WAIT, Make, Team
+from tests.listening import WAIT
+from tests.runtime.conftest import FOREVER, Make, Team, Watcher
 
 pytestmark = [
-    pytest.mark.usefixtures("_alone", "_compiled"),
+    pytest.mark.nightly,
+    pytest.mark.usefixtures("_realtime", "_compiled"),
     pytest.mark.skipif(CHROMIUM is None, reason=WHY_NOT),
 ]
-Watcher = Callable[..., Bus]
 # On a busy machine a page may have been silent for too long: then it takes the controls again.
 STAYS_IN_CHARGE = "news && !news.driver && drive.say({kind: 'take'})"
 # Likewise a release may have come before all robots had said that they were stopped.
@@ -44,7 +45,7 @@ navigator.getGamepads = () => [window.stick, null, null, null];
 
 
 @pytest.fixture
-def chromium(_alone: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
     with browser(tmp_path_factory.mktemp("profile")) as running:
         yield running
 
@@ -112,7 +113,7 @@ def test_a_team_is_driven_stopped_and_released_from_a_page(
         team__robots=1,
         reference__driver="hand",
         world__mode="realtime",
-        world__duration=600.0,
+        world__duration=FOREVER,
         recorder__enabled=True,
     )
     with team.launch(standing=False) as running:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
-from quadriga.shared.runtime.clock import monotonic, sleep
-from tests.runtime.conftest import WAIT
+from quadriga.shared.runtime.clock import sleep
+from quadriga.team.launch import QUADRIGA
+from tests.listening import WAIT, await_true
 
 pytestmark = pytest.mark.usefixtures("_compiled")
 
@@ -33,41 +33,25 @@ def alive(pid: int) -> bool:
 
 
 @pytest.mark.parametrize(
-    ("number", "status"),
-    [(signal.SIGINT, 130), (signal.SIGTERM, 130), (signal.SIGKILL, -signal.SIGKILL)],
+    ("number", "status"), [(signal.SIGINT, 130), (signal.SIGKILL, -signal.SIGKILL)]
 )
 def test_an_interrupted_collection(tmp_path: Path, number: signal.Signals, status: int) -> None:
     collection = subprocess.Popen(
-        [
-            sys.executable,
-            "-m",
-            "quadriga",
-            "collect",
-            "--robots",
-            "1",
-            "--set",
-            "identification.seconds=600",
-        ],
+        (*QUADRIGA, "collect", "--robots", "1", "--set", "identification.seconds=600"),
         env={**os.environ, "XDG_CACHE_HOME": str(tmp_path)},
         start_new_session=True,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,
     )
-    deadline = monotonic() + WAIT
     # The workers and multiprocessing's resource tracker.
-    while len(workers := descendants(collection.pid)) < 2 and monotonic() < deadline:
-        sleep(0.05)
-    assert len(workers) >= 2
+    await_true(lambda: len(descendants(collection.pid)) >= 2)
     sleep(0.5)
-    if number == signal.SIGINT:  # as a terminal does
-        os.killpg(collection.pid, number)
-    else:
-        collection.send_signal(number)
+    workers = descendants(collection.pid)
+    kill = os.killpg if number == signal.SIGINT else os.kill  # the first as a terminal does
+    kill(collection.pid, number)
     _, errors = collection.communicate(timeout=WAIT)
     assert collection.returncode == status
     assert "Traceback" not in errors
-    while any(map(alive, workers)) and monotonic() < deadline:
-        sleep(0.05)
-    assert not [pid for pid in workers if alive(pid)]
+    await_true(lambda: not any(map(alive, workers)))
     assert not list(tmp_path.rglob("*.npz"))

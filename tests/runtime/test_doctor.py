@@ -1,4 +1,7 @@
-"""`quadriga doctor` beside processes that are missing, frozen, or not what they should be."""
+"""`quadriga doctor` beside processes that are missing, frozen, or not what they should be.
+
+With `--watch` files say who is healthy, until the walk is over.
+"""
 
 from __future__ import annotations
 
@@ -7,16 +10,20 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+import threading
+from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from quadriga.commands.parser import main
+from quadriga.doctor import watch_team
 from quadriga.shared.about import About, about_key
 from quadriga.shared.bus.discovery import ProcessInfo, describe_process
-from quadriga.shared.bus.session import HERE, Bus
+from quadriga.shared.bus.session import HERE, READY, Bus
 from quadriga.shared.codec import decode, encode
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
@@ -25,7 +32,8 @@ from quadriga.shared.errors import ProcessError
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import QUADRIGA, Launch
-from tests.runtime.conftest import BEGUN, WAIT, Make, Team
+from tests.listening import WAIT, await_true
+from tests.runtime.conftest import BEGUN, Make, Watcher
 
 WAITS = """
 import sys
@@ -38,17 +46,18 @@ with Bus.open(config.bus, "team", "r2") as bus:
 """
 
 
-def doctor(config: Config, *options: str, of: Team | None = None) -> tuple[int, dict[str, Any]]:
+def doctor(*options: str) -> tuple[int, dict[str, Any]]:
     """Exit status and JSON of the command, which leaves within seconds whatever it meets."""
     command = [*QUADRIGA, "doctor", "--json", *options]
-    if of is None:
-        command += ["--connect", config.bus.endpoint, "--robots", str(config.team.robots)]
-        command += ["--set", "recorder.enabled=false"]
-    else:
-        command += ["--config", str(of.folder / "config.toml")]
     done = subprocess.run(command, capture_output=True, text=True, timeout=WAIT, check=False)
     assert done.stderr == ""
     return done.returncode, json.loads(done.stdout)
+
+
+def at(config: Config) -> tuple[str, ...]:
+    """The options that name a team."""
+    words = ("--connect", config.bus.endpoint, "--robots", str(config.team.robots))
+    return (*words, "--set", "recorder.enabled=false")
 
 
 def codes(report: dict[str, Any]) -> dict[str, list[str]]:
@@ -96,7 +105,7 @@ def test_each_process_is_told_with_what_is_wrong_with_it(
             assert buses["sim"].wait_for(HERE, {"r2"}, WAIT, lambda: False)
             r2.send_signal(signal.SIGSTOP)
             begun = monotonic()
-            status, report = doctor(config)
+            status, report = doctor(*at(config))
             took = monotonic() - begun
         finally:
             r2.kill()
@@ -125,13 +134,13 @@ def test_each_process_is_told_with_what_is_wrong_with_it(
 
 
 def test_a_team_that_waits_for_one_and_a_doctor_that_is_none_of_it(
-    make_team: Make, watcher: Callable[[Team], Bus]
+    make_team: Make, watcher: Watcher
 ) -> None:
     team = make_team()
     rows = tuple(row for row in team.rows(standing=True) if row.name != "r2")
     with Launch(rows, team.folder / "logs") as running:
         assert watcher(team).wait_for(HERE, {"sim", "r1", "operator"}, WAIT, lambda: False)
-        status, report = doctor(team.config, of=team)
+        status, report = doctor("--config", team.file)
         assert running.alive == {"sim", "r1", "operator"}
     assert status == 1
     assert codes(report) == {
@@ -142,16 +151,6 @@ def test_a_team_that_waits_for_one_and_a_doctor_that_is_none_of_it(
     }
     texts = {m["name"]: m["diagnoses"][0]["text"] for m in report["members"]}
     assert texts["r1"] == "here, waits for r2"
-
-
-def test_a_doctor_beside_a_walk_finds_all_well_and_leaves_it_alone(make_team: Make) -> None:
-    team = make_team(world__duration=600.0)
-    with team.launch() as running:
-        team.await_log("sim", BEGUN)
-        _, report = doctor(team.config, of=team)
-        assert running.alive == {"sim", "r1", "r2", "operator"}
-        running.watch(lambda: True)
-    assert set().union(*codes(report).values()) == {"ready"}
 
 
 def test_a_process_with_another_configuration_does_not_walk(make_team: Make) -> None:
@@ -175,7 +174,7 @@ def test_a_process_with_another_configuration_does_not_walk(make_team: Make) -> 
 
 
 def test_nobody_at_all(config: Config) -> None:
-    status, report = doctor(config)
+    status, report = doctor(*at(config))
     assert status == 1
     assert report["link"]["code"] == "link"
     assert report["link"]["text"] == f"nobody listens at {config.bus.endpoint}"
@@ -183,9 +182,58 @@ def test_nobody_at_all(config: Config) -> None:
 
 
 def test_this_computer_alone(config: Config) -> None:
-    _, report = doctor(config, "--here")
+    _, report = doctor(*at(config), "--here")
     assert "members" not in report
     assert report["link"]["verdict"] == "note", "nobody need listen yet"
     found = {item["code"]: item["verdict"] for item in report["here"]}
     assert found.keys() >= {"realtime", "governor", "cores", "memory", "disk", "cache", "clock"}
     assert found["packages"] == "good"
+
+
+def await_line(path: Path, line: str) -> None:
+    """Wait until the doctor has written this down."""
+    await_true(
+        lambda: path.exists() and path.read_text(encoding="utf-8") == f"{line}\n",
+        lambda: f"{path.name} never was {line!r}",
+    )
+
+
+def test_files_say_who_is_healthy_until_the_walk_is_over(
+    config: Config, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(watch_team, "EVERY", 0.1)
+    names = ("r1", "r2", "r3", "operator", "sim")
+    stop = threading.Event()
+    doctor = threading.Thread(
+        target=watch_team.watch_team, args=(config, tmp_path, stop.is_set), daemon=True
+    )
+    with ExitStack() as stack:
+        stack.enter_context(Bus.route(config.bus.endpoint, "team"))
+        doctor.start()
+        stack.callback(stop.set)
+        await_line(tmp_path / "router", "well")
+        buses = {n: stack.enter_context(Bus.open(config.bus, "team", n)) for n in names}
+        for bus in buses.values():
+            ProcessInfo(bus, config)
+            bus.declare(HERE)
+        await_line(tmp_path / "r1", "not well: here, waits for the others")
+        for bus in buses.values():
+            bus.declare(READY)
+        for name in (*names, "doctor"):
+            await_line(tmp_path / name, "well")
+        buses["operator"].close()
+        await_line(tmp_path / "r1", "not well: does not hear operator")
+        buses["sim"].close()  # who drives time
+        doctor.join(WAIT)
+        assert not doctor.is_alive()
+    assert list(tmp_path.iterdir()) == [], "what is old says nothing"
+
+
+def test_a_folder_that_is_not_there_costs_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["doctor", "--watch", str(tmp_path / "none")]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert "No such file or directory" in said
+    assert main(["doctor", "--watch", str(tmp_path), "--json"]) == 2

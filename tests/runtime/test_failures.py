@@ -5,52 +5,69 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
+from rich.console import Console
 
-from quadriga.recordings.summary import summarise
-from quadriga.shared.bus.session import Bus
+from quadriga.commands.parser import main
+from quadriga.recordings.check import check
+from quadriga.recordings.summary import summarise, summary_of
+from quadriga.recordings.traces import read_traces
 from quadriga.shared.codec import decode, encode
-from quadriga.shared.config.write import to_toml
+from quadriga.shared.codes import LEAD_GONE, LINK_LOST
 from quadriga.shared.errors import ProcessError
-from quadriga.shared.messages import Clock, EStop, Event, Status
+from quadriga.shared.messages import Event, Status
+from quadriga.shared.recording.metadata import END
 from quadriga.shared.runtime.clock import monotonic, sleep
-from quadriga.shared.topics import CLOCK, COMMAND, EVENT
+from quadriga.shared.topics import CLOCK, COMMAND, EVENT, TRUTH
 from quadriga.team import launch
-from tests.runtime.awaiting import TEAM, await_tick
-from tests.runtime.conftest import BEGUN, WAIT, Make, run_alone
-
-FOREVER = 600.0  # s of world time
-Watcher = Callable[..., Bus]
+from quadriga.team.launch import Launch
+from quadriga.team.run_report import report_folder
+from tests.listening import WAIT
+from tests.runtime.conftest import (
+    BEGUN,
+    FOREVER,
+    Make,
+    Team,
+    Watcher,
+    await_packet,
+    await_tick,
+    router,
+    run_command,
+)
 
 
 def never() -> bool:
     return False
 
 
-@pytest.mark.parametrize("mode", ["lockstep", "realtime"])
+IN_BOTH_MODES = pytest.mark.parametrize(
+    "mode", ["lockstep", pytest.param("realtime", marks=pytest.mark.nightly)]
+)
+
+
+@IN_BOTH_MODES
 def test_a_frozen_robot_is_named_and_the_walk_ends(make_team: Make, mode: str) -> None:
     team = make_team(world__mode=mode, world__duration=FOREVER, world__command_timeout=3.0)
     rows = [replace(row, grace=1.0 if row.name == "r2" else row.grace) for row in team.rows()]
-    with launch.Launch(rows, team.folder / "logs") as running:
+    with Launch(rows, team.folder / "logs") as running:
         team.await_log("sim", BEGUN)
         os.kill(running.pids["r2"], signal.SIGSTOP)
         with pytest.raises(ProcessError, match="r2 silent for"):
             running.watch(never)
-    ends = [line for line in team.log("sim").splitlines() if "command-lost" in line]
-    assert len(ends) == 1
-    assert "command-lost  r2 silent for" in ends[0]
+    (end,) = [line for line in team.log("sim").splitlines() if "command-lost" in line]
+    assert "command-lost  r2 silent for" in end
 
 
+@pytest.mark.nightly
 def test_in_real_time_the_world_waits_for_no_frozen_listener(
     make_team: Make, watcher: Watcher
 ) -> None:
     """Its buffers are full some seconds after it froze, and what must not be lost waits 5 s."""
     pushes = ",".join(f"r1:5:90:{second}:0.1" for second in range(1, 120))
     team = make_team(world__mode="realtime", world__duration=FOREVER, world__push=pushes)
-    echo = (*launch.QUADRIGA, "echo", "**", "--config", str(team.folder / "config.toml"))
+    echo = (*launch.QUADRIGA, "echo", "**", "--config", team.file)
     with team.launch() as running, subprocess.Popen(echo, stdout=subprocess.PIPE) as listener:
         try:
             assert listener.stdout is not None
@@ -63,7 +80,7 @@ def test_in_real_time_the_world_waits_for_no_frozen_listener(
                 packet = bus.get(WAIT)
                 assert packet is not None
                 longest, last = max(longest, monotonic() - last), monotonic()
-                if packet[0] == EVENT.key(TEAM):
+                if packet[0] == EVENT.key("team"):
                     event = decode(packet[1], Event)
                     assert event.kind != "stop", event.detail
                     received += event.kind == "push"
@@ -73,7 +90,7 @@ def test_in_real_time_the_world_waits_for_no_frozen_listener(
     assert longest < 2.0
 
 
-@pytest.mark.parametrize("name", ["sim", "r2", "operator"])
+@pytest.mark.parametrize("name", ["r2", "operator"])
 def test_kill_9_of_one_stops_the_walk_and_names_it(make_team: Make, name: str) -> None:
     team = make_team(world__duration=FOREVER)
     with team.launch() as running:
@@ -87,14 +104,66 @@ def test_kill_9_of_one_stops_the_walk_and_names_it(make_team: Make, name: str) -
     assert not [pid for pid in pids.values() if os.path.exists(f"/proc/{pid}")]
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_stopped_sim_server_ends_the_walk_for_all(
-    make_team: Make, number: signal.Signals
+def statuses(running: Launch) -> dict[str, int]:
+    """Exit status of each process, once it has ended by itself."""
+    return {name: process.wait(WAIT) for name, process in running._running.items()}
+
+
+def check_recording(team: Team, code: str, what: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """The recording is whole, says how it ended, and all that read it say so."""
+    recording, path = team.recording(), str(team.folder / "run.mcap")
+    recording.require_whole()
+    assert recording.notes[END]["code"] == code
+    assert "end" in {finding.name for finding in check(recording.path) if not finding.passed}
+    assert main(["check", path]) == 1
+    assert main(["info", path]) == 0
+    assert capsys.readouterr().out.count(f"{what}: none any more after") == 2
+    assert summary_of(read_traces(recording))["end_code"] == code
+    with pytest.raises(ProcessError, match="the walk: got an end at"):
+        report_folder(team.folder, pictures=False, console=Console(quiet=True))
+
+
+@pytest.mark.usefixtures("_compiled")
+def test_kill_9_of_who_drives_time(
+    make_team: Make, watcher: Watcher, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    team = make_team(recorder__enabled=True, world__duration=FOREVER)
+    with team.launch(standing=False) as running:
+        await_tick(watcher(team, TRUTH), 500)
+        os.kill(running.pids["sim"], signal.SIGKILL)
+        ended = statuses(running)
+    others = ("r1", "r2", "operator", "recorder")
+    assert ended == {"sim": -signal.SIGKILL, **dict.fromkeys(others, 1)}
+    for name in others:
+        last = team.log(name).splitlines()[-1]
+        assert f"process sim of team 'team', seen by {name}: got none any more after" in last
+    check_recording(team, LEAD_GONE, "process sim of team 'team', seen by recorder", capsys)
+
+
+@pytest.mark.usefixtures("_compiled")
+@IN_BOTH_MODES
+def test_kill_9_of_the_router(
+    make_team: Make, watcher: Watcher, capsys: pytest.CaptureFixture[str], mode: str
+) -> None:
+    keys = {"bus__mode": "client", "world__mode": mode}
+    team = make_team(recorder__enabled=True, world__duration=FOREVER, **keys)
+    endpoint = team.config.bus.endpoint
+    with router(endpoint) as process, team.launch(standing=False) as running:
+        await_tick(watcher(team, TRUTH), 500)
+        process.kill()
+        ended = statuses(running)
+    assert ended == dict.fromkeys(("sim", "r1", "r2", "operator", "recorder"), 1)
+    for name in ended:
+        link = f"link of {name} to the router at {endpoint}: got none any more after"
+        assert link in team.log(name).splitlines()[-1]
+    check_recording(team, LINK_LOST, f"link of recorder to the router at {endpoint}", capsys)
+
+
+def test_a_stopped_sim_server_ends_the_walk_for_all(make_team: Make) -> None:
     team = make_team(world__duration=FOREVER)
     with team.launch() as running:
         team.await_log("sim", BEGUN)
-        os.kill(running.pids["sim"], number)
+        os.kill(running.pids["sim"], signal.SIGTERM)
         running.watch(never)  # all leave by themselves, with exit status 0
     assert team.log("sim").splitlines()[-1].endswith("signal  signal")
 
@@ -111,32 +180,25 @@ def test_an_end_that_somebody_else_announces_ends_nothing(
     with team.launch(standing=False) as running:
         bus = watcher(team, CLOCK)
         say = bus.publisher(EVENT.key("team"))
-        said, deadline = list[int](), monotonic() + WAIT
-        while len(said) < 20 and monotonic() < deadline:
-            packet = bus.get(1.0)
-            tick = decode(packet[1], Clock).tick if packet is not None else 0
-            if tick >= 1000 + 100 * len(said):
-                say(encode(Event.of(tick, "signal", "", "forged")))
-                said.append(tick)
+        for number in range(20):
+            tick = await_tick(bus, 1000 + 100 * number, CLOCK)
+            say(encode(Event.of(tick, "signal", "", "forged")))
         running.watch(never)
     summary = summarise(team.folder)
-    assert len(said) == 20
     assert summary["end"].startswith("end of world.duration")
     assert (summary["fallen"], summary["stop_reasons"], summary["gaps"]) == ([], {}, 0)
-    ticks = [entry.tick for entry in team.recording().entries({COMMAND.name})]
-    assert max(ticks) >= 3999
+    assert max(entry.tick for entry in team.recording().entries({COMMAND.name})) >= 3999
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.usefixtures("_compiled")
 def test_a_stopped_agent_leaves_cleanly_and_the_walk_stops(
-    make_team: Make, monkeypatch: pytest.MonkeyPatch, number: signal.Signals
+    make_team: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(launch, "_EARLY", 0.3)
     team = make_team(team__robots=1, world__duration=FOREVER)
     with team.launch(standing=False) as running:
         team.await_log("sim", BEGUN)
-        os.kill(running.pids["r1"], number)
+        os.kill(running.pids["r1"], signal.SIGINT)
         with pytest.raises(ProcessError, match="process r1: got an end while the team walked"):
             running.watch(never)
     said = team.log("r1").splitlines()
@@ -147,93 +209,74 @@ def test_a_stopped_agent_leaves_cleanly_and_the_walk_stops(
 @pytest.mark.usefixtures("_compiled")
 def test_an_emergency_stop_damps_every_robot(make_team: Make, watcher: Watcher) -> None:
     team = make_team(world__duration=FOREVER)
+    modes: dict[str, str] = {}
+
+    def all_stopped(key: str, payload: bytes) -> bool:
+        if key.endswith("/status") and (status := decode(payload, Status)).mode == "estop":
+            modes[key] = status.reason
+        return len(modes) == 2
+
     with team.launch(standing=False) as running:
         team.await_log("sim", BEGUN)
         bus = watcher(team)
-        stop = launch.ProcessSpec(
-            "estop",
-            (
-                *launch.QUADRIGA,
-                "estop",
-                "--reason",
-                "smoke",
-                "--config",
-                str(team.folder / "config.toml"),
-            ),
-            5.0,
-        )
-        assert run_alone(stop) == (0, "")
-        modes: dict[str, str] = {}
-        deadline = monotonic() + WAIT
-        while len(modes) < 2 and monotonic() < deadline:
-            packet = bus.get(1.0)
-            if packet is not None and packet[0].endswith("/status"):
-                status = decode(packet[1], Status)
-                if status.mode == "estop":
-                    modes[packet[0]] = status.reason
-            elif packet is not None and packet[0].endswith("/estop"):
-                assert decode(packet[1], EStop).reason == "smoke"
+        assert run_command("estop", "--reason", "smoke", "--config", team.file) == (0, "")
+        await_packet(bus, all_stopped)
         assert modes == {f"team/{robot}/status": "estop:smoke" for robot in ("r1", "r2")}
         running.watch(lambda: True)
 
 
-@pytest.mark.parametrize("mode", ["lockstep", "realtime"])
+@IN_BOTH_MODES
 def test_the_world_obeys_an_emergency_stop_whatever_the_agents_do(
     make_team: Make, mode: str
 ) -> None:
     """These stand on: they have never heard of an emergency stop."""
     team = make_team(world__duration=FOREVER, world__mode=mode)
-    file = str(team.folder / "config.toml")
     with team.launch() as running:
         team.await_log("sim", BEGUN)
-        command = (*launch.QUADRIGA, "estop", "--reason", "smoke", "--config", file)
-        status, errors = run_alone(launch.ProcessSpec("estop", command, 5.0))
+        status, errors = run_command("estop", "--reason", "smoke", "--config", team.file)
         assert status == 2, "no agent says that it has stopped"
         assert "no word of r1, r2 after 0.5 s; r1: says nothing, r2: says nothing" in errors
-        team.await_log("sim", "estop  smoke: every joint is damped")
-        team.await_log("sim", "lies r1")
-        team.await_log("sim", "lies r2")
+        for text in ("estop  smoke: every joint is damped", "lies r1", "lies r2"):
+            team.await_log("sim", text)
         running.watch(lambda: True)
     assert "fall of" not in team.log("sim")
 
 
-@pytest.mark.usefixtures("_compiled")
 def test_an_emergency_stop_waits_for_nobody(make_team: Make, watcher: Watcher) -> None:
     """Also where it is meant for a robot that is not there, which then is named."""
     team = make_team(world__duration=FOREVER)
     larger = replace(team.config, team=replace(team.config.team, robots=3))
-    file = team.folder / "larger.toml"
-    file.write_text(to_toml(larger), encoding="utf-8")
+    (team.folder / "larger").mkdir()
+    file = Team(larger, team.folder / "larger").file
     with team.launch() as running:
         team.await_log("sim", BEGUN)
         bus = watcher(team)
-        stop = subprocess.Popen(
-            [*launch.QUADRIGA, "estop", "--config", str(file)], stderr=subprocess.PIPE, text=True
-        )
-        deadline, received = monotonic() + WAIT, False
-        while not received and monotonic() < deadline:
-            packet = bus.get(1.0)
-            received = packet is not None and packet[0].endswith("/estop")
-        assert received
-        assert stop.poll() is None, "it still looks for r3"
-        _, errors = stop.communicate(timeout=WAIT)
+        estop = (*launch.QUADRIGA, "estop", "--config", file)
+        with subprocess.Popen(estop, stderr=subprocess.PIPE, text=True) as stop:
+            await_packet(bus, lambda key, _: key.endswith("/estop"))
+            assert stop.poll() is None, "it still looks for r3"
+            _, errors = stop.communicate(timeout=WAIT)
         running.watch(lambda: True)
     assert stop.returncode == 2
     assert "no r3 on the bus after 5 s" in errors
     assert "sent to r1, r2, sim at once" in errors
 
 
-@pytest.mark.parametrize("verb", [("sim",), ("operate",), ("record", "-o", "RUN")])
-def test_a_process_alone_names_the_absent(make_team: Make, verb: tuple[str, ...]) -> None:
+@pytest.mark.parametrize(
+    ("verb", "absent"),
+    [
+        (("sim",), "operator, r1, r2"),
+        (("operate",), "r1, r2, sim"),
+        (("record", "-o", "alone.mcap"), "operator, r1, r2, sim"),
+    ],
+)
+def test_a_process_alone_names_the_absent(
+    make_team: Make, verb: tuple[str, ...], absent: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     team = make_team(bus__barrier_timeout=0.5)
-    file = team.folder / "config.toml"
-    file.write_text(to_toml(team.config), encoding="utf-8")
-    words = [str(team.folder / "alone.mcap") if word == "RUN" else word for word in verb]
-    row = launch.ProcessSpec("alone", (*launch.QUADRIGA, *words, "--config", str(file)), 5.0)
-    status, errors = run_alone(row)
+    monkeypatch.chdir(team.folder)
+    status, errors = run_command(*verb, "--config", team.file)
     assert status == 2
-    others = {"sim": "operator, r1, r2", "operate": "r1, r2, sim"}
-    absent = others.get(verb[0], "operator, r1, r2, sim")
     assert f"no {absent} at stage 'here' after 0.5 s" in errors
     said_before = [line for line in errors.splitlines() if "waits until all are there" in line]
     assert errors.count("\n") == 1 + len(said_before)

@@ -44,7 +44,8 @@ def who_is_late(folder: Path) -> set[str]:
     return {robot for robot, ticks in late if int(ticks) > end.tick / 2}
 
 
-@pytest.mark.usefixtures("_alone", "_compiled")
+@pytest.mark.nightly
+@pytest.mark.usefixtures("_realtime", "_compiled")
 def test_a_killed_agent_and_a_dead_knee(tmp_path: Path) -> None:
     rows_file, folder = tmp_path / "rows.json", tmp_path / "out"
     faults = ("agent-killed", "knee-off")

@@ -2,39 +2,59 @@
 
 from __future__ import annotations
 
-import hashlib
 import re
-from collections import defaultdict
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from quadriga.shared.bus.session import READY, Bus
 from quadriga.shared.codec import M, decode, encode
+from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
 from quadriga.shared.messages import Command, Event, Reference, State, Status, Truth
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.robots.conventions import robot_names
-from quadriga.shared.runtime.clock import monotonic
-from quadriga.shared.topics import ESTOP, EVENT, STATUS, TABLE, TRUTH
-from tests.runtime.conftest import BEGUN, WAIT, Make, Team, run_alone
+from quadriga.shared.topics import ESTOP, EVENT, STATUS, TABLE
+from tests.listening import WAIT
+from tests.runtime.conftest import FOREVER, Make, Team, Watcher, await_tick, digests, router
+from tests.runtime.fortress import make_fortress, serving
 
 
-def test_every_tick_is_answered_and_recorded_and_everyone_leaves(make_team: Make) -> None:
-    team = make_team(recorder__enabled=True, world__duration=1.0)
+def test_every_tick_is_answered_and_routers_change_nothing(make_team: Make) -> None:
+    """One of plain TCP, which comes last and leaves after the walk, and one of certificates."""
+    team = make_team(recorder__enabled=True, world__duration=0.5)
     recording = team.run()
     for robot in ("r1", "r2"):
-        assert [m.tick for m in recording.messages(State, robot)] == list(range(1000))
-        assert [m.tick for m in recording.messages(Command, robot)] == list(range(1000))
-    assert [m.tick for m in recording.messages(Truth)] == list(range(0, 1000, 10))
-    assert {m.tick for m in recording.messages(Reference)} >= set(range(0, 1300, 100))
+        assert [m.tick for m in recording.messages(State, robot)] == list(range(500))
+        assert [m.tick for m in recording.messages(Command, robot)] == list(range(500))
+    assert [m.tick for m in recording.messages(Truth)] == list(range(0, 500, 10))
+    assert {m.tick for m in recording.messages(Reference)} >= set(range(0, 800, 100))
     events = [(m.tick, m.kind, m.detail) for m in recording.messages(Event)]
     assert events[0][1] == "start"
-    assert events[-1] == (1000, "stop", "end of world.duration")
+    assert events[-1] == (500, "stop", "end of world.duration")
+    expected, bus = digests(recording), team.config.bus
+
+    routed = within(team, "routed", replace(team.config, bus=replace(bus, mode="client")))
+    options = ("--once", "--set", f"bus.barrier_timeout={WAIT:g}")
+    with routed.launch() as running, router(bus.endpoint, *options, says="") as process:
+        running.watch(lambda: False)
+        assert process.wait(WAIT) == 0
+    assert digests(routed.recording()) == expected
+
+    secure = within(team, "secure", team.config)
+    own = make_fortress(secure.folder)
+    config = replace(team.config, bus=replace(own.config.bus, barrier_timeout=WAIT))
+    with serving(own):
+        assert digests(replace(secure, config=config).run()) == expected
+
+
+def within(team: Team, name: str, config: Config | None = None) -> Team:
+    """A team with a folder of its own."""
+    folder = team.folder / name
+    folder.mkdir()
+    return replace(team, folder=folder, config=config or team.config)
 
 
 def test_the_end_comes_a_second_after_a_fall(make_team: Make) -> None:
@@ -48,56 +68,31 @@ def test_the_end_comes_a_second_after_a_fall(make_team: Make) -> None:
 @pytest.mark.usefixtures("_compiled")
 def test_two_runs_of_one_scenario_give_the_same_bytes(make_team: Make) -> None:
     team = make_team(recorder__enabled=True, world__duration=0.8, estimator__kind="kalman")
-    digests = []
-    for run in ("first", "second"):
-        folder = team.folder / run
-        folder.mkdir()
-        digests.append(payloads(Team(team.config, folder).run(standing=False)))
-    assert {"team/r1/command", "team/r2/measurement", "team/reference"} <= digests[0].keys()
-    assert digests[0] == digests[1]
-
-
-def payloads(recording: Recording) -> dict[str, str]:
-    """Digest of the payloads of every key, in order; `status` carries wall-clock times."""
-    found: dict[str, Any] = defaultdict(hashlib.sha256)
-    for entry in recording.entries():
-        if not entry.key.endswith("/status"):
-            found[entry.key].update(len(entry.payload).to_bytes(4) + entry.payload)
-    return {key: digest.hexdigest() for key, digest in found.items()}
+    first, second = (digests(within(team, name).run(standing=False)) for name in ("a", "b"))
+    assert {"team/r1/command", "team/r2/measurement", "team/reference"} <= first.keys()
+    assert first == second
 
 
 @pytest.mark.usefixtures("_compiled")
 def test_malformed_messages_on_every_key_are_dropped_and_counted(
-    make_team: Make, watcher: Callable[..., Bus]
+    make_team: Make, watcher: Watcher
 ) -> None:
-    team = make_team(recorder__enabled=True, world__duration=600.0)
+    team = make_team(recorder__enabled=True, world__duration=FOREVER)
     with team.launch(standing=False) as running:
         bus = watcher(team)
         assert bus.wait_for(READY, {"sim"}, WAIT, lambda: False)
         inject_noise(bus, team)
         team.await_log("sim", "commands dropped")
-        await_tick(bus, team, 1000)
+        await_tick(bus, 1000)
         running.watch(lambda: True)
     recording = team.recording()
-    events = valid(recording, EVENT.key("team"), Event)
-    faults = [m.detail for m in events if m.kind == "fault"]
+    faults = [m.detail for m in valid(recording, EVENT.key("team"), Event) if m.kind == "fault"]
     assert any("commands dropped" in fault for fault in faults), faults
     for robot in ("r1", "r2"):
         last = valid(recording, STATUS.key("team", robot), Status)[-1]
         assert last.mode == "walk"
         for name in ("state", "reference", "sim/event"):
             assert last.counters[f"dropped_{name}"] >= 4, (robot, name, last.counters)
-
-
-def await_tick(bus: Bus, team: Team, tick: int) -> None:
-    """Wait until the world has come to a tick."""
-    deadline, now = monotonic() + WAIT, 0
-    while now < tick:
-        assert monotonic() < deadline
-        packet = bus.get(1.0)
-        if packet is not None and packet[0] == TRUTH.key(team.config.team.name):
-            with suppress(MessageError):
-                now = decode(packet[1], Truth).tick
 
 
 def valid(recording: Recording, key: str, kind: type[M]) -> list[M]:
@@ -113,17 +108,11 @@ def valid(recording: Recording, key: str, kind: type[M]) -> list[M]:
 def inject_noise(bus: Bus, team: Team) -> None:
     """Publish what is no message on every key of the team, but where it is an emergency stop."""
     nan = np.full(12, np.nan)
-    noise = [
-        b"",
-        b"\xc1\xff",
-        b"\x81\xa6schema\x01",
-        bytes(70_000),
-        encode(Command(1, 1, nan, nan, nan, nan, nan)),
-    ]
+    forged = encode(Command(1, 1, nan, nan, nan, nan, nan))
     for topic in (topic for topic in TABLE if topic is not ESTOP):
         for robot in robot_names(team.config.team.robots) if topic.per_robot else ("",):
             put = bus.publisher(topic.key(team.config.team.name, robot))
-            for payload in noise:
+            for payload in (b"", b"\xc1\xff", b"\x81\xa6schema\x01", bytes(70_000), forged):
                 put(payload)
 
 
@@ -134,22 +123,3 @@ def test_real_time_says_what_came_late(make_team: Make) -> None:
     last = team.log("sim").splitlines()[-1]
     # Whether the robot stands so long on a busy machine is not the subject.
     assert re.fullmatch(r"\d+ ms: time-over  .+; late ticks: .+; overruns of the world: \d+", last)
-
-
-def test_a_second_team_does_not_disturb_the_first(make_team: Make) -> None:
-    team = make_team(team__robots=1, recorder__enabled=True, world__duration=600.0)
-    intruders = team.folder / "intruders"
-    intruders.mkdir()
-    second = Team(team.config, intruders)
-    with team.launch() as running:
-        team.await_log("sim", BEGUN)
-        rows = [row for row in second.rows(standing=False) if row.name in ("sim", "r1")]
-        with ThreadPoolExecutor() as side_by_side:
-            (sim_status, sim_said), (agent_status, agent_said) = side_by_side.map(run_alone, rows)
-        running.watch(lambda: True)
-    assert (sim_status, agent_status) == (2, 2)
-    assert "Address already in use" in sim_said
-    assert "a team that walks already" in agent_said
-    ticks = [m.tick for m in team.recording().messages(Command, "r1")]
-    assert ticks == list(range(len(ticks)))
-    assert "fault" not in team.log("sim")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
-from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
@@ -16,11 +15,11 @@ from quadriga.shared.config.write import to_toml
 from quadriga.shared.members import DOCTOR, LAST, ROUTER
 from quadriga.shared.messages import Command
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns
+from quadriga.shared.runtime.clock import utc_now
 from quadriga.shared.security.access import team_identities
 from quadriga.team.launch import Launch, ProcessSpec
 from tests.deploy.test_compose import SERVICES, TEAM, resolve
-from tests.runtime.conftest import WAIT
+from tests.listening import WAIT, await_true
 from tests.runtime.namespaces import computers, on, why_not
 
 NAMES = (ROUTER, DOCTOR, LAST, "sim", "r1", "r2", "operator")
@@ -65,10 +64,10 @@ def write_team(folder: Path, router: str) -> None:
     certificates = CertificateFolder(
         folder / "certs", [who.name for who in team_identities(config)]
     )
-    now = datetime.fromtimestamp(1e-9 * wall_ns(), UTC)
-    certificates.make(config.team.name, [router], now, 1.0)
+    certificates.make(config.team.name, [router], utc_now(), 1.0)
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("_compiled")
 def test_a_team_walks_across_networks_with_certificates(
     addresses: dict[str, str], tmp_path: Path
@@ -76,16 +75,14 @@ def test_a_team_walks_across_networks_with_certificates(
     write_team(tmp_path, addresses[ROUTER])
     well = tmp_path / "health" / ROUTER
     with Launch([row(name, tmp_path) for name in (ROUTER, DOCTOR)], tmp_path / "logs") as around:
-        deadline = monotonic() + WAIT
-        while not well.exists() or well.read_text(encoding="utf-8") != "well\n":
-            assert monotonic() < deadline, (tmp_path / "logs" / "doctor.log").read_text("utf-8")
-            sleep(0.05)
+        await_true(
+            lambda: well.exists() and well.read_text(encoding="utf-8") == "well\n",
+            lambda: (tmp_path / "logs" / "doctor.log").read_text("utf-8"),
+        )
         walkers = [row(name, tmp_path) for name in NAMES[2:]]
         with Launch(walkers, tmp_path / "logs") as team:
             team.watch(lambda: False)
-        while around.alive and monotonic() < deadline:
-            sleep(0.05)
-        assert around.alive == set(), "they leave after the walk"
+        await_true(lambda: not around.alive)  # they leave after the walk
     said = (tmp_path / "logs" / "router.log").read_text(encoding="utf-8")
     assert said.splitlines() == ["routing at tls/0.0.0.0:7447"]
     assert all(finding.passed for finding in check(tmp_path / "run.mcap"))

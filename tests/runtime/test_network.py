@@ -6,7 +6,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -21,11 +21,14 @@ from quadriga.faults.trial import draw_fault
 from quadriga.shared.config.load import load
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.members import OPERATOR
-from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.sim_server.emulator.link import LinkFaults
 from quadriga.team.launch import Launch, process_table
+from tests.listening import await_true
 
-pytestmark = pytest.mark.skipif(os.geteuid() != 0, reason="namespaces need root")
+pytestmark = [
+    pytest.mark.nightly,
+    pytest.mark.skipif(os.geteuid() != 0, reason="namespaces need root"),
+]
 
 # Sends datagrams, one after the other, to one that sends them back; prints the milliseconds that
 # each took, −1 if it did not come back in time.
@@ -144,7 +147,7 @@ def test_nothing_is_left_when_who_made_it_is_killed(tmp_path: Path) -> None:
         air = int(made.stdout.readline())
         assert set(devices_of(layout)) == {layout.air(TEAM), layout.cable("r1")}
         made.send_signal(signal.SIGKILL)
-    await_(lambda: not devices_of(layout) and not Path(f"/proc/{air}").exists())
+    await_true(lambda: not devices_of(layout) and not Path(f"/proc/{air}").exists())
 
 
 def test_nothing_is_left_when_the_air_is_killed(tmp_path: Path) -> None:
@@ -152,13 +155,6 @@ def test_nothing_is_left_when_the_air_is_killed(tmp_path: Path) -> None:
     with EmulatedNetwork(layout, 1, tmp_path / "log") as network:
         network._air.kill()
         network._air.wait()
-        await_(lambda: not devices_of(layout))
+        await_true(lambda: not devices_of(layout))
         with pytest.raises(ProcessError, match="the emulated network"):
             network.order(RadioOrder("r1", LinkFaults()))
-
-
-def await_(happens: Callable[[], bool]) -> None:
-    deadline = monotonic() + 10.0
-    while not happens():
-        assert monotonic() < deadline
-        sleep(0.02)

@@ -6,7 +6,6 @@ import os
 import signal
 from collections import defaultdict
 from dataclasses import replace
-from itertools import zip_longest
 from pathlib import Path
 
 import pytest
@@ -20,11 +19,11 @@ from quadriga.identification.predictors import ensure_predictor
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.bus.liveness import LAST_PACKETS
 from quadriga.shared.bus.session import Bus
-from quadriga.shared.codec import decode, encode
+from quadriga.shared.codec import encode
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
-from quadriga.shared.messages import Clock, Command, Event, Measurement, Plan
+from quadriga.shared.messages import Event, Plan
 from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.robots.conventions import robot_names
@@ -33,7 +32,8 @@ from quadriga.shared.topics import CLOCK, EVENT
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import Launch, process_table
 from quadriga.team.operator import reference_at
-from tests.runtime.conftest import DATA, WAIT
+from tests.golden.compare import first_difference
+from tests.runtime.conftest import DATA, await_tick
 
 pytestmark = pytest.mark.usefixtures("_compiled")
 
@@ -43,7 +43,6 @@ KINDS: dict[str, dict[str, object]] = {
     "deepc": {"planner.kind": "deepc"},
     "cooperative": {"planner.cost": "team", "planner.exchanges": 1},
     "exchanged": {"planner.exchanges": 2, "planner.compensation": True, "planner.damping": 0.2},
-    "fast": {"planner.preset": "fast"},
 }
 
 
@@ -89,41 +88,20 @@ def over_the_bus(config: Config, predictor: Path, folder: Path) -> dict[str, lis
     return sent
 
 
-def first_difference(key: str, expected: list[bytes], got: list[bytes]) -> str:
-    """Where two sequences of messages part; empty if nowhere."""
-    for index, (one, other) in enumerate(zip_longest(expected, got)):
-        if one != other:
-            kind = {"command": Command, "measurement": Measurement, "plan": Plan}[
-                key.rpartition("/")[2]
-            ]
-            messages = [payload and decode(payload, kind) for payload in (one, other)]
-            alone, bus = messages
-            return f"{key}, message {index}: {alone} in one process, {bus} over the bus"
-    return ""
-
-
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_bus_changes_nothing(kind: str, tmp_path: Path) -> None:
     config = config_of(kind)
     predictor = ensure_predictor(config, Console(stderr=True))
     alone, together = in_one_process(config, predictor), over_the_bus(config, predictor, tmp_path)
     for key, payloads in alone.items():
-        assert not first_difference(key, payloads, together[key])
+        sent = [(key, payload) for payload in together[key]]
+        assert first_difference([(key, payload) for payload in payloads], sent) is None
     for name in robot_names(ROBOTS):
         exchanges = config.planner.exchanges + 1
         begin = first_step(config) * step_ms(config)
         steps = len(range(begin, round(1000 * SECONDS), step_ms(config)))
         assert len(together[f"team/{name}/plan"]) == pytest.approx(steps * exchanges, abs=exchanges)
         assert len(alone[f"team/{name}/command"]) == 1000 * SECONDS
-
-
-def await_tick(bus: Bus, tick: int) -> int:
-    """The first of the clock that is no earlier."""
-    while True:
-        packet = bus.get(WAIT)
-        assert packet is not None, f"the team never reached tick {tick}"
-        if (now := decode(packet[1], Clock).tick) >= tick:
-            return now
 
 
 def test_a_central_planner_outlives_a_false_end_and_a_pause_after_it(tmp_path: Path) -> None:
@@ -137,10 +115,10 @@ def test_a_central_planner_outlives_a_false_end_and_a_pause_after_it(tmp_path: P
         Bus.open(config.bus, config.team.name, "watcher") as bus,
     ):
         bus.subscribe(CLOCK.key(config.team.name))
-        now = await_tick(bus, 1000)
+        now = await_tick(bus, 1000, CLOCK)
         false = Event.of(1 << 41, "signal", "", "forged")
         bus.publisher(EVENT.key(config.team.name))(encode(false))
-        await_tick(bus, now + AHEAD_MS + 200)
+        await_tick(bus, now + AHEAD_MS + 200, CLOCK)
         os.kill(running.pids["sim"], signal.SIGSTOP)
         sleep(LAST_PACKETS + 0.5)
         os.kill(running.pids["sim"], signal.SIGCONT)

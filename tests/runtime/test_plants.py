@@ -3,31 +3,23 @@
 from __future__ import annotations
 
 import os
-import shutil
 import signal
 import subprocess
-import sys
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from quadriga.shared.bus.session import Bus
-from quadriga.shared.codec import decode
 from quadriga.shared.errors import ProcessError
-from quadriga.shared.messages import Clock, Command, Event, Measurement, Reference, State, Truth
-from quadriga.shared.recording.reader import Recording
-from quadriga.shared.runtime.clock import monotonic, sleep
-from quadriga.shared.runtime.places import SOURCE
+from quadriga.shared.messages import Command, Event, Measurement, Reference, State, Truth
 from quadriga.shared.topics import CLOCK
-from quadriga.team import launch
-from quadriga.team.launch import Launch, ProcessSpec
-from tests.runtime.conftest import BEGUN, WAIT, Make
+from quadriga.team.launch import QUADRIGA, Launch, ProcessSpec
+from tests.listening import WAIT
+from tests.plugins.kinds import install_package
+from tests.runtime.conftest import BEGUN, FOREVER, Make, Watcher, await_tick
+from tests.runtime.test_walk import await_walking, processes_of
 
-FOREVER = 600.0  # s of world time
-Watcher = Callable[..., Bus]
 EACH = {"team__plant_per_robot": True, "world__mode": "realtime", "team__yokes": "none"}
 
 pytestmark = pytest.mark.usefixtures("_compiled")
@@ -37,70 +29,46 @@ def never() -> bool:
     return False
 
 
-@pytest.fixture(scope="session")
-def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the package of `tests/plugins/puppet`, installed."""
-    folder = tmp_path_factory.mktemp("site")
-    package = folder / "source"  # a copy: pip builds where the source is
-    shutil.copytree(SOURCE / "tests" / "plugins" / "puppet", package)
-    pip = (sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check")
-    flags = ("--no-deps", "--no-build-isolation", "--no-index", "--target", str(folder))
-    subprocess.run([*pip, *flags, str(package)], check=True, timeout=WAIT)
-    return folder
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Of processes that find the package `tests/plugins/puppet`."""
+    return install_package("puppet", tmp_path_factory.mktemp("site"))
 
 
 @pytest.fixture
-def puppets(site: Path, make_team: Make, monkeypatch: pytest.MonkeyPatch) -> Make:
+def puppets(path: str, make_team: Make, monkeypatch: pytest.MonkeyPatch) -> Make:
     """A function that makes a team whose robots are puppets."""
-    path = os.pathsep.join(filter(None, (str(site), os.environ.get("PYTHONPATH", ""))))
     monkeypatch.setenv("PYTHONPATH", path)
     return lambda **keys: make_team(team__plant="puppet", **keys)
 
 
-def check_walked_to_the_end(recording: Recording, *, lockstep: bool) -> None:
-    """Both robots were measured and commanded; the walk ended when 1 s of its clock was over."""
+@pytest.mark.parametrize("keys", [{}, EACH], ids=["lockstep", "a plant each, in real time"])
+def test_a_plant_of_another_package_walks(puppets: Make, keys: dict[str, Any]) -> None:
+    """Both robots are measured and commanded; the walk ends when 1 s of its clock is over."""
+    recording = puppets(recorder__enabled=True, world__duration=1.0, **keys).run(standing=False)
     for robot in ("r1", "r2"):
         states = [message.tick for message in recording.messages(State, robot)]
         commands = [message.tick for message in recording.messages(Command, robot)]
-        if lockstep:
+        if not keys:
             assert states == commands == list(range(1000))
         else:  # a world that gets too little of a busy machine slows down, and states are lost
-            assert len(states) > 100
-            assert len(commands) > 100
+            assert min(len(states), len(commands)) > 100
     assert {m.tick for m in recording.messages(Reference)} >= set(range(0, 1000, 100))
     events = list(recording.messages(Event))
     assert [(e.tick, e.code) for e in events if e.kind == "stop"] == [(1000, "time-over")]
-
-
-@pytest.mark.parametrize(
-    "keys", [{}, {"world__mode": "realtime"}, EACH], ids=["lockstep", "realtime", "a plant each"]
-)
-def test_a_plant_of_another_package_walks(puppets: Make, keys: dict[str, Any]) -> None:
-    team = puppets(recorder__enabled=True, world__duration=1.0, **keys)
-    recording = team.run(standing=False)
-    check_walked_to_the_end(recording, lockstep=not keys)
     assert not list(recording.messages(Truth)), "nobody knows it"
     assert not list(recording.entries({CLOCK.name}))
 
 
+@pytest.mark.nightly
 def test_robots_in_worlds_of_their_own_walk(make_team: Make) -> None:
     team = make_team(recorder__enabled=True, world__duration=2.0, **EACH)
     recording = team.run(standing=False)
     for robot in ("r1", "r2"):
-        speed = [m.y[1] for m in recording.messages(Measurement, robot)]
-        assert max(speed) > 0.3, "it walks"
+        assert max(m.y[1] for m in recording.messages(Measurement, robot)) > 0.3, "it walks"
 
 
-def await_clock(bus: Bus, tick: int) -> None:
-    """Wait until the team's clock has come to a tick."""
-    deadline, now = monotonic() + WAIT, -1
-    while now < tick:
-        assert monotonic() < deadline
-        packet = bus.get(1.0)
-        if packet is not None and packet[0] == CLOCK.key(bus.team):
-            now = decode(packet[1], Clock).tick
-
-
+@pytest.mark.nightly
 def test_a_fall_in_one_world_ends_the_walk_of_all(make_team: Make) -> None:
     push = "r2:2000:0:0.1:0.2"
     team = make_team(recorder__enabled=True, world__duration=9.0, world__push=push, **EACH)
@@ -112,34 +80,30 @@ def test_a_fall_in_one_world_ends_the_walk_of_all(make_team: Make) -> None:
     assert [e.kind for e in events].count("start") == 1
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.nightly
+@pytest.mark.parametrize(
+    ("dies", "other", "number"),
+    [(2, 1, signal.SIGTERM), (2, 1, signal.SIGKILL), (1, 2, signal.SIGKILL)],
+)
 def test_a_plant_that_dies_stops_the_team_and_is_named(
-    puppets: Make, watcher: Watcher, number: signal.Signals
+    puppets: Make, watcher: Watcher, dies: int, other: int, number: signal.Signals
 ) -> None:
+    """Also if it is the one that drives time."""
     team = puppets(world__duration=FOREVER, **EACH)
     with team.launch() as running:
         pids = running.pids
-        await_clock(watcher(team), 100)
-        os.kill(pids["plant_r2"], number)
-        team.await_log("plant_r1", "plant-gone  plant_r2 gone")
+        await_tick(watcher(team), 100, CLOCK)
+        os.kill(pids[f"plant_r{dies}"], number)
+        said = f"got plant_r{dies} gone, expected the plants of all robots"
+        team.await_log(f"plant_r{other}", said)
         with pytest.raises(ProcessError, match=r"process plant_r[12]"):
             running.watch(never)
-    assert "got plant_r2 gone, expected the plants of all robots" in team.log("plant_r1")
+    if dies == 2:
+        assert "plant-gone  plant_r2 gone" in team.log("plant_r1")
     assert not [pid for pid in pids.values() if os.path.exists(f"/proc/{pid}")]
 
 
-def test_the_others_leave_when_who_drives_time_dies(puppets: Make, watcher: Watcher) -> None:
-    team = puppets(world__duration=FOREVER, **EACH)
-    with team.launch() as running:
-        pids = running.pids
-        await_clock(watcher(team), 100)
-        os.kill(pids["plant_r1"], signal.SIGKILL)
-        team.await_log("plant_r2", "got plant_r1 gone, expected the plants of all robots")
-        with pytest.raises(ProcessError, match=r"process plant_r[12]"):
-            running.watch(never)
-    assert not [pid for pid in pids.values() if os.path.exists(f"/proc/{pid}")]
-
-
+@pytest.mark.nightly
 @pytest.mark.parametrize(("frozen", "other"), [(1, 2), (2, 1)])
 def test_a_frozen_plant_is_missed_in_real_time_whoever_leads(
     puppets: Make, watcher: Watcher, frozen: int, other: int
@@ -147,12 +111,11 @@ def test_a_frozen_plant_is_missed_in_real_time_whoever_leads(
     """Robots of the others lie down; an arm's length of silence is enough."""
     team = puppets(world__duration=FOREVER, bus__clock_timeout=2.0, **EACH)
     with team.launch() as running:
-        await_clock(watcher(team), 100)
+        await_tick(watcher(team), 100, CLOCK)
         pid = running.pids[f"plant_r{frozen}"]
         os.kill(pid, signal.SIGSTOP)
-        team.await_log(
-            f"plant_r{other}", f"got plant_r{frozen} silent for 2 s, expected the plants"
-        )
+        said = f"got plant_r{frozen} silent for 2 s, expected the plants"
+        team.await_log(f"plant_r{other}", said)
         os.kill(pid, signal.SIGCONT)
         with pytest.raises(ProcessError, match=r"process plant_r[12]"):
             running.watch(never)
@@ -182,20 +145,15 @@ def test_a_robot_whose_agent_leaves_ends_the_walk_of_all(make_team: Make) -> Non
         team.await_log("plant_r1", "command-lost  r2 gone")
 
 
+@pytest.mark.nightly
 def test_a_walk_that_is_told_to_stop_leaves_no_plant_behind(make_team: Make) -> None:
     team = make_team(world__duration=FOREVER, **EACH)
-    team.rows(standing=False)
-    file = str(team.folder / "config.toml")
-    walk = (*launch.QUADRIGA, "walk", "--config", file, "--out", str(team.folder / "out"))
+    out = team.folder / "out"
+    walk = (*QUADRIGA, "walk", "--config", team.file, "--out", str(out))
     with subprocess.Popen(walk, stdout=subprocess.PIPE, stderr=subprocess.STDOUT) as process:
-        log = team.folder / "out" / "logs" / "plant_r1.log"
-        deadline = monotonic() + WAIT
-        while not (log.exists() and BEGUN in log.read_text(encoding="utf-8")):
-            assert monotonic() < deadline
-            sleep(0.05)
-        children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
-        commands = [Path(f"/proc/{pid}/cmdline").read_bytes() for pid in children]
-        assert len(commands) == 5, f"two plants, two agents, the operator, but {commands}"
+        await_walking(out, "plant_r1")
+        found = {*processes_of(out).values()} - {"launcher"}
+        assert found == {"plant_r1", "plant_r2", "r1", "r2", "operator"}
         process.terminate()
         assert process.wait(WAIT) == 130
-    assert not [pid for pid in children if os.path.exists(f"/proc/{pid}")]
+    assert not processes_of(out)

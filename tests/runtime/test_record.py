@@ -6,28 +6,19 @@ import os
 import resource
 import signal
 import subprocess
-import sys
 from pathlib import Path
 
 from quadriga.recordings.survey import survey
 from quadriga.shared.messages import Event
-from quadriga.shared.runtime.clock import monotonic, sleep
-from tests.runtime.conftest import BEGUN, WAIT, Make, Team
+from quadriga.team.launch import QUADRIGA
+from tests.listening import WAIT, await_true
+from tests.runtime.conftest import BEGUN, FOREVER, Make, Team
 
 
 def beside(team: Team, name: str, room: int = -1) -> subprocess.Popen[str]:
     """A `quadriga record` of its own, which may write no more than `room` bytes."""
     return subprocess.Popen(
-        [
-            sys.executable,
-            "-m",
-            "quadriga",
-            "record",
-            "-o",
-            str(team.folder / name),
-            "--config",
-            str(team.folder / "config.toml"),
-        ],
+        (*QUADRIGA, "record", "-o", str(team.folder / name), "--config", team.file),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -36,7 +27,7 @@ def beside(team: Team, name: str, room: int = -1) -> subprocess.Popen[str]:
 
 
 def test_recorders_die_beside_a_team_that_walks_on(make_team: Make) -> None:
-    team = make_team(team__robots=1, recorder__enabled=True, world__duration=600.0)
+    team = make_team(team__robots=1, recorder__enabled=True, world__duration=FOREVER)
     late = team.folder / "late.mcap"
     others = []
     try:
@@ -78,7 +69,4 @@ def test_recorders_die_beside_a_team_that_walks_on(make_team: Make) -> None:
 
 def await_size(path: Path, size: int) -> None:
     """Wait until a file has grown to `size` bytes."""
-    deadline = monotonic() + WAIT
-    while not path.exists() or path.stat().st_size < size:
-        assert monotonic() < deadline, f"{path} does not grow to {size}"
-        sleep(0.02)
+    await_true(lambda: path.exists() and path.stat().st_size >= size)

@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -29,10 +30,11 @@ from quadriga.shared.errors import ConfigError, RecordingError
 from quadriga.shared.messages import Command, Consumed, Measurement, Message, Plan, State
 from quadriga.shared.recording.reader import Recording
 from quadriga.team.endpoint import free_endpoint
-from quadriga.team.launch import Launch, process_table
+from quadriga.team.launch import QUADRIGA, Launch, process_table
 from quadriga.what_if.what_if import Branch, WhatIf, answer_what_if
+from tests.listening import WAIT
 from tests.quadriga.replay.rewritten import planted_bit, rewritten, without
-from tests.runtime.conftest import DATA, REAL_TIME, SPEED, WAIT
+from tests.runtime.conftest import DATA, REAL_TIME, SPEED
 
 pytestmark = pytest.mark.usefixtures("_compiled")
 
@@ -66,13 +68,24 @@ def lockstep(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return walked(tmp_path_factory.mktemp("lockstep") / "run", world__duration=1.0)
 
 
-def replayed(path: Path, *robots: str, **keys: Any) -> list[ReplayOutcome]:
-    """Outcomes of a replay, `section__key` changed."""
+def sections(keys: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """Values by section and key, of names `section__key`."""
     given: dict[str, dict[str, Any]] = {}
     for name, value in keys.items():
         section, _, key = name.partition("__")
         given.setdefault(section, {})[key] = value
-    return replay(path, robots, given, None, None, Console(stderr=True))
+    return given
+
+
+def edited(lockstep: Path, folder: Path, *edits: Any, **keys: Any) -> Path:
+    """The recording with something changed, beside its predictor."""
+    shutil.copy(lockstep.parent / "predictor.npz", folder)
+    return rewritten(lockstep, folder / "run.mcap", *edits, **keys)
+
+
+def replayed(path: Path, *robots: str, **keys: Any) -> list[ReplayOutcome]:
+    """Outcomes of a replay, `section__key` changed."""
+    return replay(path, robots, sections(keys), None, None, Console(stderr=True))
 
 
 def check_exact(path: Path, outcomes: list[ReplayOutcome], *, plans: bool = True) -> None:
@@ -117,11 +130,8 @@ def test_the_qps_of_a_moment_are_saved(lockstep: Path, tmp_path: Path) -> None:
 
 def answered(path: Path, out: Path, *robots: str, **keys: Any) -> Branch:
     """What would have happened had `section__key` been changed from 0.6 s on."""
-    given: dict[str, dict[str, Any]] = {}
-    for name, value in keys.items():
-        section, _, key = name.partition("__")
-        given.setdefault(section, {})[key] = value
-    return answer_what_if(WhatIf(path, 0.6, given, None, robots, out), Console(stderr=True))
+    question = WhatIf(path, 0.6, sections(keys), None, robots, out)
+    return answer_what_if(question, Console(stderr=True))
 
 
 def test_what_would_have_happened(lockstep: Path, tmp_path: Path) -> None:
@@ -157,9 +167,7 @@ def test_what_cannot_be_asked_of_a_walk(lockstep: Path, tmp_path: Path) -> None:
 def test_a_planted_bit_in_a_state_is_found_at_its_tick(
     lockstep: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    run = tmp_path / "run.mcap"
-    shutil.copy(lockstep.parent / "predictor.npz", tmp_path)
-    rewritten(lockstep, run, planted_bit("team/r2/state", 702, "v_joint"))
+    run = edited(lockstep, tmp_path, planted_bit("team/r2/state", 702, "v_joint"))
     assert main(["replay", str(run), "--robot", "r1"]) == 0, "no input of r1"
     capsys.readouterr()
     assert main(["replay", str(run), "--robot", "r2"]) == 1
@@ -177,9 +185,7 @@ def test_a_planted_bit_in_a_state_is_found_at_its_tick(
 def test_a_planted_bit_in_a_peer_s_measurement_is_found_in_the_next_plan(
     lockstep: Path, tmp_path: Path
 ) -> None:
-    run = tmp_path / "run.mcap"
-    shutil.copy(lockstep.parent / "predictor.npz", tmp_path)
-    rewritten(lockstep, run, planted_bit("team/r1/measurement", 630, "y"))
+    run = edited(lockstep, tmp_path, planted_bit("team/r1/measurement", 630, "y"))
     (outcome,) = replayed(run, "r2")
     first = outcome.verdict.first
     assert first is not None
@@ -192,9 +198,7 @@ def test_a_planted_bit_in_a_peer_s_measurement_is_found_in_the_next_plan(
 
 
 def test_a_changed_key_is_found_at_the_first_tick_it_acts(lockstep: Path, tmp_path: Path) -> None:
-    run = tmp_path / "run.mcap"
-    shutil.copy(lockstep.parent / "predictor.npz", tmp_path)
-    rewritten(lockstep, run, config={"controller.swing_height": 0.1})
+    run = edited(lockstep, tmp_path, config={"controller.swing_height": 0.1})
     for outcome in replayed(run):
         first = outcome.verdict.first
         assert first is not None
@@ -216,57 +220,39 @@ def test_a_change_is_drawn_instead_of_failing(
     assert "changed" not in capsys.readouterr().out
 
 
-LOST: dict[str, tuple[str, int, int, str]] = {
-    "state": ("team/r2/state", 500, 500, "state of r2 at tick 500"),
-    "plan": ("team/r1/plan", 480, 500, "plan:r1:12.0"),
-    "measurement": ("team/r1/measurement", 470, 500, "measurement:r1:470"),
-    "reference": ("team/reference", 600, 600, "reference:operator:600"),
-}
-
-
-@pytest.mark.parametrize("name", LOST)
+@pytest.mark.parametrize(
+    ("key", "made", "status", "told"),
+    [
+        ("r2/state", 500, 1, "state of r2 at tick 500 (tick 500)"),
+        ("r1/plan", 480, 1, "plan:r1:12.0 (tick 500)"),
+        ("r1/measurement", 470, 1, "measurement:r1:470 (tick 500)"),
+        ("reference", 600, 1, "reference:operator:600 (tick 600)"),
+        ("r2/command", 500, 0, "equal to the byte; 1 command not in the recording; 1.0 s in"),
+    ],
+)
 def test_a_message_the_recorder_lost_is_named(
-    lockstep: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
+    lockstep: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    key: str,
+    made: int,
+    status: int,
+    told: str,
 ) -> None:
-    key, made, tick, output = LOST[name]
-    run = tmp_path / "run.mcap"
-    shutil.copy(lockstep.parent / "predictor.npz", tmp_path)
-    rewritten(lockstep, run, without(key, made))
-    assert main(["replay", str(run), "--robot", "r2"]) == 1
-    assert f"input missing from the recording: {output} (tick {tick})" in capsys.readouterr().out
-
-
-def test_a_command_the_recorder_lost_is_counted_and_the_rest_is_equal(
-    lockstep: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    run = tmp_path / "run.mcap"
-    shutil.copy(lockstep.parent / "predictor.npz", tmp_path)
-    rewritten(lockstep, run, without("team/r2/command", 500))
-    assert main(["replay", str(run), "--robot", "r2"]) == 0
-    assert "equal to the byte; 1 command not in the recording; 1.0 s in" in capsys.readouterr().out
+    """A lost input ends the comparison; a lost output is counted, and the rest is equal."""
+    run = edited(lockstep, tmp_path, without(f"team/{key}", made))
+    assert main(["replay", str(run), "--robot", "r2"]) == status
+    text = f"input missing from the recording: {told}" if status else told
+    assert text in capsys.readouterr().out
 
 
 def test_the_debugger_stops_with_the_agent_in_scope(lockstep: Path) -> None:
-    typed = "p 'ticks', memory.tick, inputs.state.tick, recorded['command'].tick\nc\n"
-    command = [sys.executable, "-m", "quadriga", "replay", str(lockstep), "--robot", "r1"]
-    done = subprocess.run(
-        [*command, "--break", "0.6"],
-        input=typed,
-        capture_output=True,
-        text=True,
-        check=True,
-        timeout=WAIT,
-    )
+    command = (*QUADRIGA, "replay", str(lockstep), "--robot", "r1", "--break", "0.6")
+    run = partial(subprocess.run, command, capture_output=True, text=True, timeout=WAIT)
+    done = run(input="p 'ticks', memory.tick, inputs.state.tick, recorded['command'].tick\nc\n")
     assert "('ticks', 599, 600, 600)" in done.stdout
     assert "measurements equal to the byte" in done.stdout
-    done = subprocess.run(
-        [*command, "--break", "0.6"],
-        input="q\n",
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=WAIT,
-    )
+    done = run(input="q\n")
     assert (done.returncode, done.stderr) == (130, "quadriga: interrupted\n")
 
 
@@ -283,7 +269,8 @@ def check_exact_up_to_a_loss(path: Path, outcome: ReplayOutcome) -> None:
         assert tick not in {m.tick for m in recording.messages(State, outcome.robot)}
 
 
-@pytest.mark.usefixtures("_alone")
+@pytest.mark.nightly
+@pytest.mark.usefixtures("_realtime")
 def test_real_time_is_replayed_to_the_byte(tmp_path: Path) -> None:
     for attempt in range(5):  # on a busy machine links drop messages, and robots pass over states
         run = walked(tmp_path / str(attempt), world__mode="realtime", world__duration=1.5)
@@ -299,7 +286,8 @@ def test_real_time_is_replayed_to_the_byte(tmp_path: Path) -> None:
     assert list(Recording(run).messages(Consumed, "r1")), "it tells what it took in"
 
 
-@pytest.mark.usefixtures("_alone")
+@pytest.mark.nightly
+@pytest.mark.usefixtures("_realtime")
 def test_what_was_taken_in_in_real_time_cannot_be_guessed(tmp_path: Path) -> None:
     for attempt in range(5):
         run = walked(tmp_path / str(attempt), world__mode="realtime", world__duration=0.5)
@@ -314,9 +302,8 @@ def test_what_was_taken_in_in_real_time_cannot_be_guessed(tmp_path: Path) -> Non
     assert name == f"{count} of inputs of r1 between ticks {before.tick} and {after.tick}"
 
 
-@pytest.mark.parametrize("kind", ["centralised"])
-def test_the_plans_of_a_central_planner_are_inputs(tmp_path: Path, kind: str) -> None:
-    run = walked(tmp_path / "run", world__duration=0.7, planner__kind=kind)
+def test_the_plans_of_a_central_planner_are_inputs(tmp_path: Path) -> None:
+    run = walked(tmp_path / "run", world__duration=0.7, planner__kind="centralised")
     outcomes = replayed(run)
     check_exact(run, outcomes, plans=False)
     assert not outcomes[0].verdict.equal["plan"]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import json
 import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -19,9 +18,9 @@ from quadriga.shared.codec import encode
 from quadriga.shared.config.load import load
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.members import SIM
-from quadriga.shared.runtime.places import SOURCE
 from quadriga.team.endpoint import free_endpoint
 from tests.listening import WAIT, await_listener, await_recorded
+from tests.plugins.kinds import install_package
 from tests.plugins.wind.quadriga_wind import WIND, Wind
 
 COUNT = 40
@@ -30,11 +29,7 @@ COUNT = 40
 @pytest.fixture(scope="module")
 def environment(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """Of processes that find the package installed, as these tests themselves do not."""
-    folder = tmp_path_factory.mktemp("plugin")
-    shutil.copytree(SOURCE / "tests" / "plugins" / "wind", folder / "wind")
-    pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-build-isolation"]
-    subprocess.run([*pip, "--target", str(folder / "site"), str(folder / "wind")], check=True)
-    path = os.pathsep.join(filter(None, [str(folder / "site"), os.environ.get("PYTHONPATH")]))
+    path = install_package("wind", tmp_path_factory.mktemp("plugin"))
     return {**os.environ, "PYTHONPATH": path}
 
 

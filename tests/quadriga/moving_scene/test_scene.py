@@ -91,6 +91,7 @@ def test_the_ground_is_drawn_near_the_team_alone(write_run: WriteRun, terrain: s
     assert np.abs(places - trunks.mean(axis=0)).max() < 4.0
 
 
+@pytest.mark.nightly
 def test_a_page_shows_it_in_a_browser(known_run: Path, tmp_path: Path) -> None:
     run = read_run(known_run / "run.mcap")
     text = scene_of(run).replace('"4 strides"', json.dumps(SPAN.title))

@@ -17,7 +17,7 @@ from quadriga.team.endpoint import free_endpoint
 from tests.browser import CHROMIUM, WHY_NOT, Browser, Page, browser
 from tests.quadriga.view.test_view import viewing
 
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason=WHY_NOT)
+pytestmark = [pytest.mark.nightly, pytest.mark.skipif(CHROMIUM is None, reason=WHY_NOT)]
 WAIT = 90.0  # s; a busy machine without a graphics card draws a scene in seconds
 ROBOTS = {"x": 200, "y": 160, "width": 560, "height": 480, "scale": 1}  # of the page, pixels
 SHOWN = "!!document.querySelector('canvas') && document.body.innerText.includes('Unitree A1')"
