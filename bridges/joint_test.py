@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from quadriga.bridges.drivers import RobotDriver, open_driver
-from quadriga.bridges.plant import TICK, RobotPlant, bridge_of, say
+from quadriga.bridges.plant import TICK, RobotPlant, say
 from quadriga.bridges.postures import WAY, moving_joint
 from quadriga.bridges.supervisor import TRACKING_ERROR, BridgeMode, Request, Supervised
 from quadriga.bridges.watchdog import Watchdog
@@ -98,7 +98,7 @@ def build_joint_tester(config: Config, name: str) -> JointTester:
         ConfigError: no address or interface that can be used.
         BridgeError: the way to the robot cannot be opened.
     """
-    kind, bridge = config.team.robot, bridge_of(config, name)
+    kind, bridge = config.team.robot, config.bridge.of_robot(name)
     return JointTester(config, name, open_driver(kind, bridge), Watchdog(kind, bridge))
 
 

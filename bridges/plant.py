@@ -24,7 +24,7 @@ from quadriga.bridges.supervisor import (
 from quadriga.bridges.watchdog import BEAT_MS, Watchdog
 from quadriga.plant.protocol import Plant
 from quadriga.shared import codes
-from quadriga.shared.config.sections import BridgeConfig, Config
+from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import CheckError, ConfigError
 from quadriga.shared.messages import Command, Event, State, Status
 from quadriga.shared.printable import printable_line
@@ -394,7 +394,7 @@ def build_bridge(
     """
     if len(names) != 1:
         raise ConfigError("team.plant_per_robot", f"a plant of {', '.join(names)}", "true")
-    kind, bridge = config.team.robot, bridge_of(config, names[0])
+    kind, bridge = config.team.robot, config.bridge.of_robot(names[0])
     driver = open_driver(kind, bridge)
     watchdog = Watchdog(kind, bridge) if armed else None
     plant = RobotPlant(config, names[0], driver, watchdog=watchdog, say=say)
@@ -404,20 +404,6 @@ def build_bridge(
         plant.finish()
         raise
     return plant
-
-
-def bridge_of(config: Config, name: str) -> BridgeConfig:
-    """The section `bridge` for the robot of this name, with its number filled in."""
-    bridge, number = config.bridge, name.removeprefix("r")
-    # On the loopback, robots that real ones keep apart by their cables have domains of their own.
-    domain = bridge.domain + (int(number) - 1 if bridge.interface == "lo" else 0)
-    return replace(
-        bridge,
-        domain=domain,
-        interface=bridge.interface.replace("{number}", number),
-        endpoint=bridge.endpoint.replace("{number}", number),
-        listen=bridge.listen.replace("{number}", number),
-    )
 
 
 def say(text: str) -> None:
