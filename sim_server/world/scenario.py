@@ -103,29 +103,19 @@ def build_scenario(config: Config, loads: Sequence[Load]) -> Scenario:
         events.append(Event.of(start, codes.WEAK_MOTOR, names[robot], detail))
     for push in sorted(pushes, key=lambda item: item.start):
         events += [Event.of(push.start, codes.PUSH, names[i], push.detail) for i in push.robots]
-    changes = {tick for push in pushes for tick in (push.start, push.stop)}
-    return Scenario(
-        forces={tick: _forces(pushes, tick, len(names)) for tick in changes},
-        strength={motor.start: _strength(weak, motor.start, len(names)) for motor in weak},
-        events=tuple(events),
-    )
-
-
-def _forces(pushes: Sequence[Push], tick: int, n: int) -> Array:
-    total = np.zeros((n, 3))
+    n = len(names)
+    forces = {tick: np.zeros((n, 3)) for push in pushes for tick in (push.start, push.stop)}
     for push in pushes:
-        if push.start <= tick < push.stop:
-            vector = [math.cos(push.direction), math.sin(push.direction), 0.0]
-            total[list(push.robots)] += push.force * np.array(vector)
-    return total
-
-
-def _strength(weak: Sequence[WeakMotor], tick: int, n: int) -> Array:
-    strength = np.ones((n, N_JOINTS))
+        vector = push.force * np.array([math.cos(push.direction), math.sin(push.direction), 0.0])
+        for tick, total in forces.items():
+            if push.start <= tick < push.stop:
+                total[list(push.robots)] += vector
+    strength = {motor.start: np.ones((n, N_JOINTS)) for motor in weak}
     for robot, joint, start, share in weak:
-        if start <= tick:
-            strength[robot, joint] = min(strength[robot, joint], share)
-    return strength
+        for tick, shares in strength.items():
+            if start <= tick:
+                shares[robot, joint] = min(shares[robot, joint], share)
+    return Scenario(forces, strength, tuple(events))
 
 
 def build_loads(config: Config) -> tuple[Load, ...]:
