@@ -170,8 +170,7 @@ def _what_is_wrong(k: int, moved: Array, way: float, during: JointSample) -> tup
     if share <= -_MOVED:
         return "it moved the other way", "the sign of its angle, or of its command"
     if share < _MOVED:
-        asked, given = (np.max(np.abs(tau[:, k])) for tau in (during.torque_asked, during.tau))
-        if given < 0.5 * asked:
+        if np.max(np.abs(during.tau[:, k])) < 0.5 * np.max(np.abs(during.torque_asked[:, k])):
             return "it did not move", "its motor gives no torque: off, or its cable"
         return "it did not move", "something holds it, or it is at its end stop"
     if others[other] > _STILL:
