@@ -30,7 +30,6 @@ from quadriga.sim_server.emulator import (
     Harness,
     MotorEvents,
     UdpEmulator,
-    command_of,
     describe_motors,
     open_emulators,
 )
@@ -76,17 +75,16 @@ def test_it_reports_once_it_has_heard_and_obeys_the_last_command_until_another_c
     assert command is not None
     np.testing.assert_allclose(command.tau, 1.0)
     assert (robot.received, robot.malformed) == (3, 1)
+    other.send(
+        A1.encode_command(replace(DRIVING, q=ZERO + NO_ANGLE, dq=ZERO + NO_RATE, kp=ZERO, kd=ZERO))
+    )
+    _, command = tick(107)
+    assert command is not None
+    np.testing.assert_array_equal([command.q_des, command.v_des], 0.0)
     driver.send(replace(DRIVING, mode=np.full(12, OFF, np.uint8)))
     assert tick(108)[1] is None
     for end in (other, driver, robot):
         end.close()
-
-
-def test_where_nothing_is_asked_for_an_angle_or_a_rate_means_nothing() -> None:
-    nothing = {"q": np.full(12, NO_ANGLE), "dq": np.full(12, NO_RATE)}
-    free = command_of(holding(config_of(), kp=ZERO, kd=ZERO, tau=ONES, **nothing))
-    assert free is not None
-    np.testing.assert_array_equal([free.q_des, free.v_des], 0.0)
 
 
 def test_each_robot_may_have_a_network_of_its_own_and_then_domain_0_like_a_real_one() -> None:
