@@ -32,6 +32,12 @@ def measure(sensors: Sensors, tick: int, channels: Array, quat: Array) -> list[S
     return [State.from_row(tick, 0, row) for row in sensors.measure(tick, q, v, tau, sensed)]
 
 
+def attitudes(n: int) -> Array:
+    """Random unit quaternions, (n, 4)."""
+    quats = np.random.default_rng(5).standard_normal((n, 4))
+    return quats / np.linalg.norm(quats, axis=1, keepdims=True)
+
+
 def record(config: SensorsConfig, ticks: int, n: int = 1, seed: int = 0) -> dict[str, np.ndarray]:
     """Every field of the last robot's messages over time, for zero motion and 100 N per foot."""
     sensors = Sensors(config, seed, range(n))
@@ -86,11 +92,8 @@ def test_noise_of_a_robot_does_not_depend_on_the_others() -> None:
 
 
 def test_without_noise_the_truth_passes_through() -> None:
-    random = np.random.default_rng(1)
-    channels = random.standard_normal((2, N_CHANNELS))
+    channels, quat = np.random.default_rng(1).standard_normal((2, N_CHANNELS)), attitudes(2)
     channels[:, -4:] = np.abs(channels[:, -4:])
-    quat = random.standard_normal((2, 4))
-    quat /= np.linalg.norm(quat, axis=1, keepdims=True)
     for i, state in enumerate(measure(Sensors(SILENT, 0, range(2)), 7, channels, quat)):
         body = [state.q_joint, state.v_joint, state.tau_joint, state.imu_gyro, state.imu_accel]
         np.testing.assert_array_equal(np.concatenate([*body, state.foot_force]), channels[i])
@@ -173,10 +176,7 @@ def test_foot_sensors_that_cannot_pull_or_are_absent() -> None:
 
 
 def test_a_tilt_is_a_rotation_in_the_trunk_frame() -> None:
-    random = np.random.default_rng(5)
-    for seed in range(20):
-        quat = random.standard_normal(4)
-        quat /= np.linalg.norm(quat)
+    for seed, quat in enumerate(attitudes(20)):
         sensors = Sensors(replace(SILENT, orientation_bias=0.1), seed, range(1))
         zero = np.zeros((1, N_CHANNELS))
         turned, level = (measure(sensors, t, zero, q[None])[0] for t, q in ((0, quat), (1, LEVEL)))
@@ -201,9 +201,7 @@ def test_encoders_and_attitude_have_errors_that_stay() -> None:
 
 def test_yaw_drifts_about_the_vertical_whatever_the_attitude() -> None:
     quiet = replace(SILENT, yaw_drift=0.1)
-    random = np.random.default_rng(3)
-    quat = random.standard_normal(4)
-    quat /= np.linalg.norm(quat)
+    (quat,) = attitudes(1)
     (measured,) = measure(Sensors(quiet, 0, range(1)), 2000, np.zeros((1, N_CHANNELS)), quat[None])
     R = pin.Quaternion(*quat).toRotationMatrix()
     turned = pin.Quaternion(*measured.imu_quat_wxyz).toRotationMatrix()
