@@ -10,7 +10,7 @@ import json
 import sys
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack
 from dataclasses import replace
 from typing import Final
@@ -237,9 +237,10 @@ def open_emulators(config: Config) -> dict[str, RobotEmulator]:
         BridgeError: a port is taken, or there is no such interface.
     """
     kind, opened = config.team.robot, dict[str, RobotEmulator]()
+    team = replace(config.bridge, interface=config.bridge.interface or "lo")
     with ExitStack() as stack:
         for name in robot_names(config.team.robots):
-            bridge = config.bridge.of_robot(name)
+            bridge = team.of_robot(name)
             if kind == "go2":
                 opened[name] = Go2Emulator(bridge.domain, bridge.interface)
             else:
@@ -296,38 +297,29 @@ def run(config: Config, *, hung: bool = False) -> None:
         end_collection()
         take_priority(config.runtime.priority)
         _log(f"{len(emulators)} simulated {config.robot.title} on the network")
-        _serve(world, emulators, harness, stopped)
-
-
-def _serve(
-    world: World,
-    emulators: Mapping[str, RobotEmulator],
-    harness: Harness | None,
-    stopped: Callable[[], bool],
-) -> None:
-    rate, lost = Rate(1e-3, slack=3.0), 0.0
-    events = {name: MotorEvents() for name in emulators}
-    while not stopped():
-        states = world.states()
-        for k, (name, emulator) in enumerate(emulators.items()):
-            emulator.report(states[name], world.motors.heat[k])
-        rate.wait()
-        commands = dict[str, Command]()
-        for name, emulator in emulators.items():
-            if (command := emulator.obey()) is not None:
-                commands[name] = command
-            doing = describe_motors(command, states[name].v_joint)
-            if (since := events[name].update(world.tick, doing)) is not None:
-                _log(f"{since} ms: {name} {doing}")
-        world.step(commands)
-        if harness is not None:
-            harness.hold()
-        if world.tick % _SECOND == 0 and (ms := round(1000.0 * (rate.lost - lost))):
-            lost = rate.lost
-            behind = "behind real time in a second: this computer is too slow"
-            _log(f"{world.tick} ms: {ms} ms {behind}")
-        world.settle()
-    _log(f"{world.tick} ms: end, {rate.overruns} ticks began late")
+        rate, lost = Rate(1e-3, slack=3.0), 0.0
+        events = {name: MotorEvents() for name in emulators}
+        while not stopped():
+            states = world.states()
+            for k, (name, emulator) in enumerate(emulators.items()):
+                emulator.report(states[name], world.motors.heat[k])
+            rate.wait()
+            commands = dict[str, Command]()
+            for name, emulator in emulators.items():
+                if (command := emulator.obey()) is not None:
+                    commands[name] = command
+                doing = describe_motors(command, states[name].v_joint)
+                if (since := events[name].update(world.tick, doing)) is not None:
+                    _log(f"{since} ms: {name} {doing}")
+            world.step(commands)
+            if harness is not None:
+                harness.hold()
+            if world.tick % _SECOND == 0 and (ms := round(1000.0 * (rate.lost - lost))):
+                lost = rate.lost
+                behind = "behind real time in a second: this computer is too slow"
+                _log(f"{world.tick} ms: {ms} ms {behind}")
+            world.settle()
+        _log(f"{world.tick} ms: end, {rate.overruns} ticks began late")
 
 
 def describe_motors(command: Command | None, rates: Array) -> str:

@@ -19,7 +19,7 @@ from quadriga.shared.errors import ConfigError, did_you_mean
 from quadriga.shared.messages import Command, Event, Flat, State
 from quadriga.shared.robots.conventions import JOINT_NAMES, N_LEGS, Array, Leg, robot_names
 from quadriga.shared.robots.spec import RobotSpec
-from quadriga.sim_server.world.scenario import LATEST, read_number
+from quadriga.sim_server.world.scenario import LATEST, read_items, read_number
 
 OFF: Final = "off"
 STUCK: Final = "stuck"
@@ -148,12 +148,28 @@ def parse_faults(
     Raises:
         ConfigError: the text does not follow the grammar, or names what there is not.
     """
-    parts = text.split(",") if text else ()
-    found = tuple(_parse(part.strip(), robots, components) for part in parts)
-    for fault in found:
-        if found.count(fault) > 1:
-            raise ConfigError(_KEY, f"{fault.robot}/{fault.detail} twice", "each fault once")
-    return found
+    found = list[ComponentFault]()
+    for part, words in read_items(_KEY, text, _GRAMMAR, (3, 4), separator=None):
+        robot, slash, component = words[0].partition("/")
+        if not slash:
+            raise ConfigError(_KEY, repr(part), _GRAMMAR)
+        for what, word, known in (
+            ("robot", robot, robots),
+            ("component", component, components),
+            ("kind", words[1], tuple(KINDS)),
+        ):
+            if word not in known:
+                hint = did_you_mean(word, known)
+                raise ConfigError(_KEY, f"{what} {word!r}", f"one of {', '.join(known)}", hint)
+        start, stop = round(1000 * read_number(_KEY, "start", words[2], part, 0.0, LATEST)), None
+        if len(words) == 4:
+            duration = read_number(_KEY, "duration", words[3], part, 1e-3, LATEST)
+            stop = start + round(1000 * duration)
+        fault = ComponentFault(robot, component, words[1], start, stop)
+        if fault in found:
+            raise ConfigError(_KEY, f"{robot}/{fault.detail} twice", "each fault once")
+        found.append(fault)
+    return tuple(found)
 
 
 def with_time(text: str, tick: int) -> str:
@@ -168,26 +184,6 @@ def with_time(text: str, tick: int) -> str:
     if len(words) not in (2, 3):
         raise ConfigError("fault", repr(text), "'robot/component kind [duration[s]]'")
     return " ".join([*words[:2], f"{1e-3 * (tick + _AHEAD_MS):.3f}", *words[2:]])
-
-
-def _parse(part: str, robots: tuple[str, ...], components: tuple[str, ...]) -> ComponentFault:
-    words = part.split()
-    if len(words) not in (3, 4) or "/" not in words[0]:
-        raise ConfigError(_KEY, repr(part), _GRAMMAR)
-    (robot, _, component), kind = words[0].partition("/"), words[1]
-    for what, word, known in (
-        ("robot", robot, robots),
-        ("component", component, components),
-        ("kind", kind, tuple(KINDS)),
-    ):
-        if word not in known:
-            hint = did_you_mean(word, known)
-            raise ConfigError(_KEY, f"{what} {word!r}", f"one of {', '.join(known)}", hint)
-    start = round(1000 * read_number(_KEY, "start", words[2], part, 0.0, LATEST))
-    if len(words) == 3:
-        return ComponentFault(robot, component, kind, start)
-    duration = read_number(_KEY, "duration", words[3], part, 1e-3, LATEST)
-    return ComponentFault(robot, component, kind, start, start + round(1000 * duration))
 
 
 class Distortion:

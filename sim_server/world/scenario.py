@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
@@ -29,7 +29,6 @@ _PUSH_NUMBERS: Final = (  # least and most; beyond 5000 N the world is no longer
     ("duration", 1e-3, LATEST),
 )
 _ANY: Final = "any"
-_STRENGTH: Final = "world.motor_strength"
 _JOINTS: Final = tuple(name.removesuffix("_joint") for name in JOINT_NAMES)
 
 
@@ -134,6 +133,17 @@ def build_loads(config: Config) -> tuple[Load, ...]:
     )
 
 
+def read_items(
+    key: str, text: str, grammar: str, counts: Collection[int], separator: str | None = ":"
+) -> Iterator[tuple[str, list[str]]]:
+    """The items between commas, each with its words; `ConfigError` at another count of these."""
+    for item in text.split(",") if text else ():
+        words = [word.strip() for word in item.split(separator)]
+        if len(words) not in counts:
+            raise ConfigError(key, repr(item.strip()), grammar)
+        yield item.strip(), words
+
+
 def push_series(config: Config, random: np.random.Generator) -> tuple[Push, ...]:
     """The pushes of `world.push_force`: one every `push_every`, on the robots in turn.
 
@@ -163,14 +173,11 @@ def parse_pushes(text: str, names: tuple[str, ...]) -> tuple[Push, ...]:
         ConfigError: the text does not follow the grammar, or names a robot not in `names`.
     """
     pushes = list[Push]()
-    for part in text.split(",") if text else ():
-        robot, *numbers = (word.strip() for word in part.split(":"))
-        if len(numbers) != 4:
-            raise ConfigError("world.push", repr(part.strip()), _PUSH)
+    for part, (robot, *numbers) in read_items("world.push", text, _PUSH, (5,)):
         if robot != "all" and robot not in names:
             raise ConfigError("world.push", f"robot {robot!r}", f"'all' or one of {list(names)}")
         force, direction, start, duration = (
-            read_number("world.push", what, word, part.strip(), low, high)
+            read_number("world.push", what, word, part, low, high)
             for word, (what, low, high) in zip(numbers, _PUSH_NUMBERS, strict=True)
         )
         first, ms = round(start * 1000), round(duration * 1000)
@@ -200,13 +207,10 @@ def weak_motors(config: Config, random: np.random.Generator) -> tuple[WeakMotor,
     Raises:
         ConfigError: the text does not follow the grammar, or names no such robot or joint.
     """
-    key, text, names = _STRENGTH, config.world.motor_strength, robot_names(config.team.robots)
+    key, names = "world.motor_strength", robot_names(config.team.robots)
     weak = list[WeakMotor]()
-    for part in text.split(",") if text else ():
-        fields = [word.strip() for word in part.split(":")]
-        if len(fields) not in (3, 4):
-            raise ConfigError(key, repr(part.strip()), _MOTOR)
-        who, which, when, share = (*fields, _SHARE)[:4]
+    for part, words in read_items(key, config.world.motor_strength, _MOTOR, (3, 4)):
+        who, which, when, share = (*words, _SHARE)[:4]
         robots = [i for i, name in enumerate(names) if who in (name, _ANY)]
         joints = [i for i, name in enumerate(_JOINTS) if which in (name, *name.split("_"), _ANY)]
         if not robots:
@@ -215,8 +219,8 @@ def weak_motors(config: Config, random: np.random.Generator) -> tuple[WeakMotor,
             expected = f"'any', a part, a leg or {_JOINTS[0]}"
             cause = "parts are hip, thigh, calf; legs are FL, FR, RL, RR"
             raise ConfigError(key, f"joint {which!r}", expected, cause)
-        start = read_number(key, "start", when, part.strip(), 0.0, LATEST)
-        gives = read_number(key, "share", share, part.strip(), 0.0, 1.0)
+        start = read_number(key, "start", when, part, 0.0, LATEST)
+        gives = read_number(key, "share", share, part, 0.0, 1.0)
         robot, joint = int(random.choice(robots)), int(random.choice(joints))
         weak.append(WeakMotor(robot, joint, round(1000 * start), gives))
     return tuple(weak)
