@@ -34,8 +34,9 @@ def measure(sensors: Sensors, tick: int, channels: Array, quat: Array) -> list[S
 
 def attitudes(n: int) -> Array:
     """Random unit quaternions, (n, 4)."""
-    quats = np.random.default_rng(5).standard_normal((n, 4))
-    return quats / np.linalg.norm(quats, axis=1, keepdims=True)
+    quats: Array = np.random.default_rng(5).standard_normal((n, 4))
+    quats /= np.linalg.norm(quats, axis=1, keepdims=True)
+    return quats
 
 
 def record(config: SensorsConfig, ticks: int, n: int = 1, seed: int = 0) -> dict[str, np.ndarray]:
