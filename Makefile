@@ -91,7 +91,6 @@ docs: pages
 pages: $(STAMP)
 	$(BIN)/quadriga config --markdown > docs/configuration.md
 	$(BIN)/python -m quadriga.shared.schema > docs/messages.md
-	$(BIN)/python -m quadriga.desk.page > docs/desk.md
 	$(BIN)/python -m quadriga.faults.page > docs/faults.md
 	$(BIN)/python -m quadriga.stop_times.page
 	$(BIN)/python -m quadriga.commands.markdown > docs/reference/command_line.md

@@ -26,6 +26,7 @@ import numpy as np
 
 from quadriga.faults.network.emulated import EmulatedNetwork
 from quadriga.faults.network.layout import NETWORKS, NetworkLayout
+from quadriga.faults.network.link import LinkFaults
 from quadriga.faults.network.order import RadioOrder
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import max_ages, periods
@@ -34,7 +35,6 @@ from quadriga.shared.members import plant_name
 from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.signals import interrupt_on_sigterm
 from quadriga.shared.topics import MEASUREMENT, PLAN, SAMPLE_MS
-from quadriga.sim_server.emulator.link import LinkFaults
 from quadriga.tables import Table, print_tables
 
 _ROBOTS: Final = ("r1", "r2")

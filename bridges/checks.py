@@ -99,10 +99,8 @@ def _at_most(name: str, got: str, value: float, most: float, unit: str, cause: s
 
 def _check_ticks(reports: Sequence[RobotReport]) -> Finding:
     count = len({report.tick for report in reports})
-    got, cause = (
-        f"{count} values in {len(reports)} reports",
-        "it repeats itself: its controller hangs",
-    )
+    got = f"{count} values in {len(reports)} reports"
+    cause = "it repeats itself: its controller hangs"
     return Finding("its counter", got, "one that goes on", count > 0.9 * len(reports), cause)
 
 
@@ -153,25 +151,21 @@ def _check_gravity(reports: Sequence[RobotReport]) -> list[Finding]:
     """It lies on its feet; specific force is g, upwards by the attitude too."""
     accel = np.mean([report.accel for report in reports], axis=0)
     size = float(np.linalg.norm(accel))
-    attitude = reports[-1].quat_wxyz
-    tilt = tilt_of(attitude)
-    cosine = float(_up_in_trunk(attitude) @ accel) / max(size, 1e-9)
+    quat = reports[-1].quat_wxyz
+    tilt = tilt_of(quat)
+    w, x, y, z = quat / max(float(np.linalg.norm(quat)), 1e-9)
+    up = np.array([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)])
+    cosine = float(up @ accel) / max(size, 1e-9)
     off = float(np.arccos(np.clip(cosine, -1.0, 1.0)))
     ok, expected = abs(size - GRAVITY) <= _GRAVITY_OFF, f"{GRAVITY:.1f} ± {_GRAVITY_OFF:g} m/s²"
-    normal = Finding("accelerometer", f"{size:.1f} m/s²", expected, ok, "is it being moved?")
     lay = "lay it on its feet on level ground"
     vertical = f"{off:.2f} rad off the accelerometer's vertical"
     axes = "the order of the quaternion, or the axes of the IMU"
     return [
         _at_most("posture", f"tilted by {tilt:.2f} rad", tilt, _FLAT, "rad", lay),
-        normal,
+        Finding("accelerometer", f"{size:.1f} m/s²", expected, ok, "is it being moved?"),
         _at_most("attitude", vertical, off, _VERTICAL_OFF, "rad", axes),
     ]
-
-
-def _up_in_trunk(quat_wxyz: Array) -> Array:
-    w, x, y, z = quat_wxyz / max(float(np.linalg.norm(quat_wxyz)), 1e-9)
-    return np.array([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)])
 
 
 def _check_legs(report: RobotReport, robot: RobotSpec) -> Finding:

@@ -130,16 +130,15 @@ class UdpDriver(RobotDriver):
         return newest
 
     def _is_newer(self, tick: int) -> bool:
-        if self._tick is not None:
-            ahead = (tick - self._tick) & 0xFFFFFFFF
-            if ahead == 0:
-                self.counters["repeated"] += 1
+        ahead = 1 if self._tick is None else (tick - self._tick) & 0xFFFFFFFF
+        if ahead == 0:
+            self.counters["repeated"] += 1
+            return False
+        if ahead >= _HALF:
+            self.counters["older"] += 1
+            self._older += 1
+            if self._older < _RESTARTED:
                 return False
-            if ahead >= _HALF:
-                self.counters["older"] += 1
-                self._older += 1
-                if self._older < _RESTARTED:
-                    return False
         self._tick, self._older = tick, 0
         return True
 
@@ -201,6 +200,7 @@ class Go2Driver(RobotDriver):
         return len(self._writers())
 
     def _writers(self) -> set[int]:
+        """Who has written commands since the last call."""
         writers = set[int]()
         while self._witness.take() is not None:
             writers.add(self._witness.writer)
@@ -251,20 +251,16 @@ class Go2Driver(RobotDriver):
     def _lie_down(self, controller: str) -> None:
         """Have the robot's own controller lie down, and wait until it lies."""
         self._call(self._sport, rpc.STAND_DOWN, {}, _LETTING_GO)
-        now = still = monotonic()
-        deadline = now + _LETTING_GO
-        while now - still < _STILL_S:
+        begun = still = monotonic()
+        while (now := monotonic()) - still < _STILL_S:
             report = self.receive()
             if report is not None and not np.abs(report.dq).max() < _STILL:
                 still = now
-            if now > deadline:
-                what, cause = (
-                    f"the robot's own controller {controller!r}",
-                    "switch it off in the app",
-                )
+            if now - begun > _LETTING_GO:
+                what = f"the robot's own controller {controller!r}"
+                cause = "switch it off in the app"
                 raise BridgeError(what, "joints that move", "to lie down", cause)
             sleep(_LOOK)
-            now = monotonic()
 
     def _await_mode(self, controller: str) -> None:
         """Wait until this controller is in charge, or none if it is ""."""
@@ -301,8 +297,7 @@ class Go2Driver(RobotDriver):
         """
         if not is_query:
             self._call(service, rpc.API_VERSION, {}, _ANSWER, is_query=True)
-        begun, asked = monotonic(), 0.0
-        number = monotonic_ns()
+        begun, asked, number = monotonic(), 0.0, monotonic_ns()
         while (now := monotonic()) - begun < seconds:
             if service.is_linked and (not asked or (is_query and now - asked > _AGAIN)):
                 service.send(RpcMessage(number, api, json.dumps(parameters)))

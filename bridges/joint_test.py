@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from quadriga.bridges.drivers import RobotDriver, open_driver
-from quadriga.bridges.plant import TICK, RobotPlant, bridge_of, say
+from quadriga.bridges.plant import TICK, RobotPlant, say
 from quadriga.bridges.postures import WAY, moving_joint
 from quadriga.bridges.supervisor import TRACKING_ERROR, BridgeMode, Request, Supervised
 from quadriga.bridges.watchdog import Watchdog
@@ -98,7 +98,7 @@ def build_joint_tester(config: Config, name: str) -> JointTester:
         ConfigError: no address or interface that can be used.
         BridgeError: the way to the robot cannot be opened.
     """
-    kind, bridge = config.team.robot, bridge_of(config, name)
+    kind, bridge = config.team.robot, config.bridge.of_robot(name)
     return JointTester(config, name, open_driver(kind, bridge), Watchdog(kind, bridge))
 
 
@@ -170,8 +170,7 @@ def _what_is_wrong(k: int, moved: Array, way: float, during: JointSample) -> tup
     if share <= -_MOVED:
         return "it moved the other way", "the sign of its angle, or of its command"
     if share < _MOVED:
-        asked, given = (np.max(np.abs(tau[:, k])) for tau in (during.torque_asked, during.tau))
-        if given < 0.5 * asked:
+        if np.max(np.abs(during.tau[:, k])) < 0.5 * np.max(np.abs(during.torque_asked[:, k])):
             return "it did not move", "its motor gives no torque: off, or its cable"
         return "it did not move", "something holds it, or it is at its end stop"
     if others[other] > _STILL:

@@ -32,13 +32,6 @@ LIMITS: Final = (
 _FINITE, _MEASURED, _GAIN, _POSITION, _SPEED, _TORQUE, _RATE, _END_STOP, _POWER = range(len(LIMITS))
 
 
-class JointReading(NamedTuple):
-    """Measured angles and rates of the joints, (12,), rad and rad/s."""
-
-    q: Array
-    dq: Array
-
-
 class JointLimits(NamedTuple):
     """Limits as compiled code takes them; arrays (12,)."""
 
@@ -100,7 +93,7 @@ def shares_of_speed(q: Array, dq: Array, fastest: Array, limits: JointLimits) ->
 
 
 def limit_targets(
-    targets: MotorTargets, measured: JointReading, before: Array, ms: int, limits: JointLimits
+    targets: MotorTargets, q: Array, dq: Array, before: Array, ms: int, limits: JointLimits
 ) -> Limited:
     """Bring a command within all limits.
 
@@ -113,17 +106,18 @@ def limit_targets(
 
     Args:
         targets: what is asked for; numbers that are none count as zero.
-        measured: the joints now.
+        q: measured angles, (12,), rad.
+        dq: measured rates, (12,), rad/s.
         before: the torque of the last command, (12,), N·m.
         ms: since then.
         limits: of this robot.
     """
     asked = np.array([targets.tau, targets.q, targets.dq, targets.kp, targets.kd])
     torque, applied = np.empty(N_JOINTS), np.zeros(len(LIMITS), dtype=np.bool_)
-    _limit(asked, measured.q, measured.dq, before, float(ms), limits, torque, applied)
-    tau, q, dq, kp, kd = asked
+    _limit(asked, q, dq, before, float(ms), limits, torque, applied)
+    tau, angle, rate, kp, kd = asked
     cut = tuple(name for name, was in zip(LIMITS, applied.tolist(), strict=True) if was)
-    return Limited(MotorTargets(targets.mode, q, dq, tau, kp, kd), torque, cut)
+    return Limited(MotorTargets(targets.mode, angle, rate, tau, kp, kd), torque, cut)
 
 
 @compiled

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -24,7 +24,7 @@ from quadriga.bridges.supervisor import (
 from quadriga.bridges.watchdog import BEAT_MS, Watchdog
 from quadriga.plant.protocol import Plant
 from quadriga.shared import codes
-from quadriga.shared.config.sections import BridgeConfig, Config
+from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import CheckError, ConfigError
 from quadriga.shared.messages import Command, Event, State, Status
 from quadriga.shared.printable import printable_line
@@ -43,8 +43,7 @@ _ANSWER_BIN: Final = 0.05  # ms
 _WARN_MS: Final = 1000, 60_000  # from a look for what to warn of to the next, and from a warning
 _LEAVE_MS: Final = 100  # of packets at the end, that one of them arrives
 _SAMPLE_AGE: Final = 5  # ms, that a report may be old at a sample of which there is no newer one
-_REMEMBERED: Final = 64  # ticks, for which the arrival of their reports is known
-_NOTHING: Final = (-1, 0.0)
+_REMEMBERED: Final = 64  # states, for which the arrival of their reports is known
 
 
 class RobotPlant(Plant):
@@ -94,7 +93,7 @@ class RobotPlant(Plant):
         self._watchdog_gone = False
         self._cut: Counter[str] = Counter()
         self._published_at = -1
-        self._arrivals = [_NOTHING] * _REMEMBERED  # tick of a state, and when its report came
+        self._arrivals = dict[int, float]()  # by tick of a state that has no command yet, s
         self._yaw: float | None = None
 
     @property
@@ -132,16 +131,8 @@ class RobotPlant(Plant):
         malformed = driver.counters["malformed"] - malformed
         cause = f"{malformed} malformed, the last one {driver.malformed}" if malformed else ""
         config, received = self._config, driver.counters["received"] - before
-        findings = check_reports(
-            reports,
-            _LOOK_MS / 1000,
-            driver.packets_ms,
-            config.bridge,
-            config.robot,
-            received=received,
-            hung=hung,
-            cause=cause,
-        )
+        way = _LOOK_MS / 1000, driver.packets_ms, config.bridge, config.robot
+        findings = check_reports(reports, *way, received=received, hung=hung, cause=cause)
         for finding in findings if tells else ():
             self._say(f"{finding.name}: {finding.got}{'' if finding.ok else '  <- not right'}")
         refuse_failed(self._name, findings)
@@ -160,20 +151,26 @@ class RobotPlant(Plant):
             self._say(f"{self._name}: dry run, no motor is enabled; --armed commands the robot")
             return True
         self.take_charge()
+        self._move(Request.STAND, (BridgeMode.STAND, BridgeMode.ESTOP), stopped)
+        if stopped():
+            return False
+        if self.mode is not BridgeMode.STAND:
+            what = f"robot {self._name}: {BridgeMode.STANDING_UP}"
+            got = self.supervision.reason or f"{self.mode} for too long"
+            raise CheckError(what, got, "a robot that stands")
+        return True
+
+    def _move(
+        self, request: Request, ends: Collection[BridgeMode], stopped: Callable[[], bool] = bool
+    ) -> None:
+        """Ask for it until the robot is in one of these modes, `stopped()`, or a mode lasts."""
         before, left = self.mode, self._left_ms
-        while self.mode is not BridgeMode.STAND:
-            if stopped():
-                return False
-            left -= 1
-            if self.mode is BridgeMode.ESTOP or left < 0:
-                what = f"robot {self._name}: {BridgeMode.STANDING_UP}"
-                got = self.supervision.reason or f"{self.mode} for too long"
-                raise CheckError(what, got, "a robot that stands")
-            self.turn(Request.STAND)
+        while self.mode not in ends and left > 0 and not stopped():
+            self.turn(request)
+            self._idle_rate.wait()
             if self.mode is not before:
                 before, left = self.mode, self._left_ms
-            self._idle_rate.wait()
-        return True
+            left -= 1
 
     def take_charge(self) -> None:
         """Have the robot's own controller let go of the motors, or raise; and answer for them."""
@@ -207,7 +204,9 @@ class RobotPlant(Plant):
         if not (is_new or (tick % SAMPLE_MS == 0 and age <= _SAMPLE_AGE)):
             return {}
         self._published_at = self.report_at
-        self._arrivals[tick % _REMEMBERED] = tick, self._arrived
+        self._arrivals[tick] = self._arrived
+        if len(self._arrivals) > _REMEMBERED:
+            del self._arrivals[next(iter(self._arrivals))]
         if self._yaw is None:
             self._yaw = yaw_of(report.quat_wxyz)
         return {self._name: to_state(report, tick, self._yaw)}
@@ -234,7 +233,8 @@ class RobotPlant(Plant):
             What was decided; None between two commands, and before the first report.
         """
         self._begin_turn()
-        arrived = None if command is None else self._take_arrival(command.tick)
+        # None if there is no command, or that of this state has been sent already.
+        arrived = None if command is None else self._arrivals.pop(command.tick, None)
         if arrived is None and self.now - self._sent_at < self.period_ms:
             return None
         if self.now - self.report_at >= self.period_ms:
@@ -270,34 +270,17 @@ class RobotPlant(Plant):
             self._untold.append((self.now, mode, reason))
         return supervised
 
-    def _take_arrival(self, tick: int) -> float | None:
-        """When the report of a state came, s; None if its command has been sent already."""
-        state_tick, arrived = self._arrivals[tick % _REMEMBERED]
-        if state_tick == tick:
-            self._arrivals[tick % _REMEMBERED] = _NOTHING
-        return arrived if state_tick == tick else None
-
     def finish(self) -> None:
         """Have the robot lie down, switch its motors off, and leave."""
         if self._in_charge:
-            self._come_to_rest()
+            self._move(Request.LIE, (BridgeMode.DRY, BridgeMode.PASSIVE, BridgeMode.ESTOP))
+            passive = round(1000 * self._config.bridge.passive_s)
+            for _ in range(_LEAVE_MS + (passive if self.mode is BridgeMode.ESTOP else 0)):
+                self.turn(Request.REST)
+                self._idle_rate.wait()
         if self._watchdog is not None:
             self._watchdog.dismiss()
         self._driver.close()
-
-    def _come_to_rest(self) -> None:
-        resting = (BridgeMode.DRY, BridgeMode.PASSIVE, BridgeMode.ESTOP)
-        rate, before, left = Rate(TICK), self.mode, self._left_ms
-        while self.mode not in resting and left > 0:
-            self.turn(Request.LIE)
-            rate.wait()
-            if self.mode is not before:
-                before, left = self.mode, self._left_ms
-            left -= 1
-        passive = round(1000 * self._config.bridge.passive_s)
-        for _ in range(_LEAVE_MS + (passive if self.mode is BridgeMode.ESTOP else 0)):
-            self.turn(Request.REST)
-            rate.wait()
 
     @property
     def _left_ms(self) -> int:
@@ -394,7 +377,7 @@ def build_bridge(
     """
     if len(names) != 1:
         raise ConfigError("team.plant_per_robot", f"a plant of {', '.join(names)}", "true")
-    kind, bridge = config.team.robot, bridge_of(config, names[0])
+    kind, bridge = config.team.robot, config.bridge.of_robot(names[0])
     driver = open_driver(kind, bridge)
     watchdog = Watchdog(kind, bridge) if armed else None
     plant = RobotPlant(config, names[0], driver, watchdog=watchdog, say=say)
@@ -404,20 +387,6 @@ def build_bridge(
         plant.finish()
         raise
     return plant
-
-
-def bridge_of(config: Config, name: str) -> BridgeConfig:
-    """The section `bridge` for the robot of this name, with its number filled in."""
-    bridge, number = config.bridge, name.removeprefix("r")
-    # On the loopback, robots that real ones keep apart by their cables have domains of their own.
-    domain = bridge.domain + (int(number) - 1 if bridge.interface == "lo" else 0)
-    return replace(
-        bridge,
-        domain=domain,
-        interface=bridge.interface.replace("{number}", number),
-        endpoint=bridge.endpoint.replace("{number}", number),
-        listen=bridge.listen.replace("{number}", number),
-    )
 
 
 def say(text: str) -> None:

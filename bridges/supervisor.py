@@ -14,15 +14,8 @@ from types import MappingProxyType
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from quadriga.bridges.limits import (
-    JointReading,
-    joint_limits,
-    limit_targets,
-    shares_of_speed,
-    temperature_limits,
-)
+from quadriga.bridges.limits import joint_limits, limit_targets, shares_of_speed, temperature_limits
 from quadriga.bridges.postures import (
     SINKING,
     TORQUE,
@@ -189,11 +182,11 @@ class Supervisor:
         self._limits = joint_limits(config, robot)
         self._warm = temperature_limits(config, robot)
         self._gentle = self._limits._replace(torque=np.minimum(TORQUE, self._limits.torque))
-        still = JointReading(np.zeros(N_JOINTS), np.zeros(N_JOINTS))
-        # Compiled, or loaded, now and not in the first millisecond.
-        limit_targets(passive(still.q), still, np.zeros(N_JOINTS), 1, self._limits)
         self._fastest = config.speed_share * np.tile(robot.speed, 4)
-        shares_of_speed(still.q, still.dq, self._fastest, self._limits)
+        # Compiled, or loaded, now and not in the first millisecond.
+        zero = np.zeros(N_JOINTS)
+        limit_targets(passive(zero), zero, zero, zero, 1, self._limits)
+        shares_of_speed(zero, zero, self._fastest, self._limits)
 
     def initial(self, now: int, *, armed: bool) -> SupervisorState:
         """Dry, or passive if it may command the robot."""
@@ -209,11 +202,9 @@ class Supervisor:
         before, state = state, self._change(self._note_rates(state, inputs), inputs)
         changes = () if state.mode is before.mode else ((state.mode, state.reason),)
         state, targets = self._command(state, inputs)
-        measured = JointReading(inputs.report.q, inputs.report.dq)
         limits = self._gentle if state.mode is BridgeMode.TESTING else self._limits
-        limited = limit_targets(
-            targets, measured, state.torque, max(1, inputs.now - state.sent), limits
-        )
+        report, ms = inputs.report, max(1, inputs.now - state.sent)
+        limited = limit_targets(targets, report.q, report.dq, state.torque, ms, limits)
         state = replace(state, torque=limited.torque, sent=inputs.now)
         return state, Supervised(limited.targets, changes, limited.cut)
 
@@ -291,8 +282,8 @@ class Supervisor:
         config = self._config
         if (tilt := tilt_of(report.quat_wxyz)) > config.tilt_max:
             return with_detail("tilt", f"{tilt:.2f} rad")
-        if (joint := _first(report.mode == PROTECTED)) is not None:
-            return with_detail("motor-protected", JOINT_NAMES[joint])
+        if (off := np.flatnonzero(report.mode == PROTECTED)).size:
+            return with_detail("motor-protected", JOINT_NAMES[off[0]])
         if heat := self._above(report, _HOTTER):
             return with_detail("temperature", heat)
         battery = report.battery
@@ -388,8 +379,3 @@ def tilt_of(quat_wxyz: Array) -> float:
     if not square > 0.25:
         return math.pi
     return math.acos(min(1.0, max(-1.0, 1.0 - 2.0 * (x * x + y * y) / square)))
-
-
-def _first(where: NDArray[np.bool_]) -> int | None:
-    """The first place that is true."""
-    return int(where.argmax()) if where.any() else None

@@ -14,9 +14,6 @@ def add(add_command: AddCommand) -> None:
     command = add_command("bridge", run, "the bridge to one real robot: a dry run, unless --armed")
     command.add_argument("--robot", required=True, metavar="NAME", help="r1 … rn")
     command.add_argument(
-        "--driver", choices=("a1", "go1", "go2"), help="kind of robot: must be that of the team"
-    )
-    command.add_argument(
         "--armed", action="store_true", help="command the robot; without, no motor is enabled"
     )
     command.add_argument(
@@ -43,9 +40,6 @@ def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
         raise ConfigError("--robot", repr(arguments.robot), f"one of {', '.join(names)}")
     if team.plant != BRIDGED:
         raise ConfigError("team.plant", repr(team.plant), repr(BRIDGED), "whose robots are these?")
-    if arguments.driver not in (None, team.robot):
-        cause = "team.robot says what the team is made of"
-        raise ConfigError("--driver", repr(arguments.driver), repr(team.robot), cause)
     for name, given, cause in (
         ("--test-joints", arguments.test_joints, "it moves the joints: hang the robot up first"),
         ("--restore", arguments.restore, "the robot may stand up: keep away from it"),
@@ -64,12 +58,11 @@ def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
 
 def _restore(config: Config, name: str, controller: str) -> int:
     from quadriga.bridges.drivers import Go2Driver
-    from quadriga.bridges.plant import bridge_of
 
     if config.team.robot != "go2":
         cause = "A1 and Go1: switch it off and on again"
         raise ConfigError("--restore", f"a team of {config.robot.title}", "of Go2", cause)
-    driver = Go2Driver(bridge_of(config, name))
+    driver = Go2Driver(config.bridge.of_robot(name))
     try:
         driver.give_back(controller)
     finally:

@@ -16,7 +16,6 @@ from quadriga.commands import (
     collect,
     completion,
     config,
-    desk,
     doctor,
     drive,
     echo,
@@ -66,8 +65,7 @@ GROUPS: Final[Mapping[str, tuple[Callable[[AddCommand], None], ...]]] = MappingP
         ),
         "walk recordings again": (replay.add, resim.add, whatif.add),
         "experiments": (
-            campaign.add, experiments.add, fault.add, desk.add, bench_stop.add, probe.add,
-            tune.add,
+            campaign.add, experiments.add, fault.add, bench_stop.add, probe.add, tune.add,
         ),
         "data and predictors": (prepare.add, collect.add, fit.add),
         "processes of a team, one by one": (

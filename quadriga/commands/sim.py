@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from quadriga.commands.command import AddCommand, Given
 from quadriga.shared.config.sections import Config
@@ -23,19 +22,12 @@ def add(add_command: AddCommand) -> None:
         dest="emulated",
         default="",
         choices=("a1", "go1", "go2"),
-        help="the simulated robots speak the protocol of this kind, for bridges, and lie at first; "
-        "commands such as 'r1 loss 0.05' come through a pipe, see docs/robots.md",
+        help="the simulated robots speak the protocol of this kind, for bridges, and lie at first",
     )
     command.add_argument(
         "--hung",
         action="store_true",
         help="with --as: the robots hang in the air, for a test of their joints",
-    )
-    command.add_argument(
-        "--truth",
-        default="",
-        metavar="FILE.csv",
-        help="with --as: write there, every 10 ms, where the robots truly are",
     )
 
 
@@ -47,9 +39,8 @@ def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
 
     if arguments.emulated:
         return _emulate(arguments, config)
-    for given, name in ((arguments.hung, "--hung"), (arguments.truth, "--truth")):
-        if given:
-            raise ConfigError(name, "no --as", "--as with a kind of robot")
+    if arguments.hung:
+        raise ConfigError("--hung", "no --as", "--as with a kind of robot")
     robot, own = arguments.robot, config.team.plant_per_robot
     permitted = robot_names(config.team.robots) if own else ("",)
     if robot not in permitted:
@@ -61,12 +52,11 @@ def run(arguments: argparse.Namespace, config: Config, _given: Given) -> int:
 
 
 def _emulate(arguments: argparse.Namespace, config: Config) -> int:
-    from quadriga.sim_server.emulator import process
+    from quadriga.sim_server import emulator
 
     kind = arguments.emulated
     if kind != config.team.robot:
         cause = "team.robot says what the team is made of"
         raise ConfigError("--as", repr(kind), repr(config.team.robot), cause)
-    truth = Path(arguments.truth) if arguments.truth else None
-    process.run(config, hung=arguments.hung, truth=truth)
+    emulator.run(config, hung=arguments.hung)
     return 0

@@ -68,8 +68,7 @@ def run_fault_campaign(
         ProcessError: a worker process died.
     """
     if not config.team.one_world:
-        cause = "robots behind bridges: `quadriga desk`"
-        raise ConfigError("team.plant", repr(config.team.plant), "one simulated world", cause)
+        raise ConfigError("team.plant", repr(config.team.plant), "one simulated world")
     rows = open_rows(config, folder)
     known = {(row["fault"], row["seed"]) for row in rows}
     todo = [(f, seed) for seed in seeds for f in faults if (f.name, seed) not in known]

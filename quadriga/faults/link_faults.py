@@ -17,9 +17,9 @@ from typing import Final
 from quadriga.faults.fault import Draw, FaultScene, SetStage, Stage, TeamFault
 from quadriga.faults.network.emulated import EmulatedNetwork
 from quadriga.faults.network.layout import NetworkLayout
+from quadriga.faults.network.link import LinkFaults
 from quadriga.faults.network.order import RadioOrder
 from quadriga.shared.config.sections import Config
-from quadriga.sim_server.emulator.link import LinkFaults
 from quadriga.sim_server.world.faults import DELAYED, GARBAGE, INTERMITTENT, OFF, SLOW
 
 _GONE: Final = LinkFaults(loss=1.0)

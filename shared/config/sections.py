@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from math import inf
 from typing import Any, Final
 
@@ -557,6 +557,15 @@ class BridgeConfig:
     stand_kp: float = number(80.0, "N·m/rad", 1.0, 300.0, "stiffness while the bridge moves it")
     stand_kd: float = number(4.0, "N·m·s/rad", 0.1, 20.0, "damping likewise")
     stand_s: float = number(3.0, "s", 1.0, 30.0, "how long standing up takes, and lying down")
+
+    def of_robot(self, name: str) -> BridgeConfig:
+        """The section for the robot of this name, with its number filled in."""
+        number = name.removeprefix("r")
+        # Robots on one loopback, which real ones are not, have DDS domains of their own.
+        domain = self.domain + (int(number) - 1 if self.interface == "lo" else 0)
+        keys = ("interface", "endpoint", "listen")
+        filled = {key: getattr(self, key).replace("{number}", number) for key in keys}
+        return replace(self, domain=domain, **filled)
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,9 +17,9 @@ from quadriga.shared import codes
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError, did_you_mean
 from quadriga.shared.messages import Command, Event, Flat, State
-from quadriga.shared.robots.conventions import JOINT_NAMES, Array, Leg, robot_names
+from quadriga.shared.robots.conventions import JOINT_NAMES, N_LEGS, Array, Leg, robot_names
 from quadriga.shared.robots.spec import RobotSpec
-from quadriga.sim_server.world.scenario import LATEST, read_number
+from quadriga.sim_server.world.scenario import LATEST, read_items, read_number
 
 OFF: Final = "off"
 STUCK: Final = "stuck"
@@ -46,6 +46,7 @@ _STREAM: Final = 5  # of the seed; terrain, sensors, pushes and motors draw from
 _OFF_BY: Final = 0.2  # rad, an angle that is wrong
 _GYRO_MOST: Final = 35.0  # rad/s, 2000 °/s: the range of usual gyros
 _ACCEL_MOST: Final = 157.0  # m/s², 16 g: the range of usual accelerometers
+_ALL: Final = slice(None)
 _FOOT_MOST: Final = 500.0  # counts, or N: more than a foot of such a robot presses
 
 Columns = NDArray[np.intp]
@@ -69,20 +70,41 @@ def build_components(robot: RobotSpec) -> Mapping[str, tuple[Component, ...]]:
     all joints and `encoder_FL_hip` …, `feet` and `foot_FL` …; motors are `motors`, `motor_FL` with
     the three of a leg …, and `motor_FL_hip` ….
     """
-    every = slice(None)
+    speed = np.tile(robot.speed, N_LEGS)
+    low, high = np.array([robot.lower, -speed]), np.array([robot.upper, speed])
+
+    def encoders(part: slice) -> Component:
+        """Of wrong ones the angles are off and the rates opposite."""
+        least, most = low[:, part], high[:, part]
+        sign, off = np.repeat([[1.0, -1.0], [_OFF_BY, 0.0]], least.shape[1], axis=1)
+        columns = _columns(State, ("q_joint", "v_joint"), part)
+        return Component(
+            State, columns, least.ravel(), most.ravel(), lambda values: sign * values + off
+        )
+
+    def motors(part: slice) -> Component:
+        """A wrong one gives the opposite torque."""
+        torque = robot.torque_limit[part]
+        most = np.concatenate([torque, np.zeros(4 * len(torque))])
+        sign = np.repeat([-1.0, -1.0, -1.0, 1.0, 1.0], len(torque))
+        columns = _columns(Command, ("tau", "kp", "kd", "q_des", "v_des"), part)
+        return Component(Command, columns, -most, most, lambda values: sign * values)
+
     joints = {n.removesuffix("_joint"): slice(k, k + 1) for k, n in enumerate(JOINT_NAMES)}
-    attitude = _sensor("imu_quat_wxyz", -1.0, 1.0)._replace(wrong=_tilt, unit_length=True)
-    gyro = _sensor("imu_gyro", -_GYRO_MOST, _GYRO_MOST)
-    accel = _sensor("imu_accel", -_ACCEL_MOST, _ACCEL_MOST)
-    parts = {"attitude": attitude, "gyro": gyro, "accel": accel}
-    parts["encoders"] = _encoders(robot, every)
-    parts |= {f"encoder_{name}": _encoders(robot, joint) for name, joint in joints.items()}
-    for name, feet in [("feet", every), *((f"foot_{g.name}", slice(g, g + 1)) for g in Leg)]:
-        parts[name] = _sensor("foot_force", 0.0, _FOOT_MOST, feet)
     legs = {leg.name: slice(3 * leg, 3 * leg + 3) for leg in Leg}
-    parts["motors"] = _motors(robot, every)
-    parts |= {f"motor_{name}": _motors(robot, part) for name, part in (legs | joints).items()}
-    return {"imu": (attitude, gyro, accel), **{name: (part,) for name, part in parts.items()}}
+    parts = {
+        "attitude": _sensor("imu_quat_wxyz", -1.0, 1.0)._replace(wrong=_tilt, unit_length=True),
+        "gyro": _sensor("imu_gyro", -_GYRO_MOST, _GYRO_MOST),
+        "accel": _sensor("imu_accel", -_ACCEL_MOST, _ACCEL_MOST),
+        "encoders": encoders(_ALL),
+        **{f"encoder_{name}": encoders(joint) for name, joint in joints.items()},
+        "feet": _sensor("foot_force", 0.0, _FOOT_MOST),
+        **{f"foot_{g.name}": _sensor("foot_force", 0.0, _FOOT_MOST, slice(g, g + 1)) for g in Leg},
+        "motors": motors(_ALL),
+        **{f"motor_{name}": motors(part) for name, part in (legs | joints).items()},
+    }
+    imu = tuple(parts[name] for name in ("attitude", "gyro", "accel"))
+    return {"imu": imu, **{name: (part,) for name, part in parts.items()}}
 
 
 def _columns(message: type[Flat], fields: Sequence[str], part: slice) -> Columns:
@@ -90,31 +112,10 @@ def _columns(message: type[Flat], fields: Sequence[str], part: slice) -> Columns
     return np.concatenate([np.arange(cut.start, cut.stop)[part] for cut in cuts])
 
 
-def _sensor(field: str, low: float, high: float, part: slice = slice(None)) -> Component:
+def _sensor(field: str, low: float, high: float, part: slice = _ALL) -> Component:
     """A sensor whose wrong numbers have the opposite sign."""
     columns = _columns(State, (field,), part)
     return Component(State, columns, np.full(len(columns), low), np.full(len(columns), high))
-
-
-def _encoders(robot: RobotSpec, joints: slice) -> Component:
-    """Encoders of these joints; of wrong ones the angles are off and the rates opposite."""
-    speed = np.tile(robot.speed, 4)
-    low, high = (
-        np.concatenate([np.array(angles)[joints], rates[joints]])
-        for angles, rates in ((robot.lower, -speed), (robot.upper, speed))
-    )
-    sign, off = np.repeat([[1.0, -1.0], [_OFF_BY, 0.0]], len(low) // 2, axis=1)
-    columns = _columns(State, ("q_joint", "v_joint"), joints)
-    return Component(State, columns, low, high, lambda values: sign * values + off)
-
-
-def _motors(robot: RobotSpec, joints: slice) -> Component:
-    """Motors of these joints; a wrong one gives the opposite torque."""
-    torque = robot.torque_limit[joints]
-    high = np.concatenate([torque, np.zeros(4 * len(torque))])
-    sign = np.repeat([-1.0, -1.0, -1.0, 1.0, 1.0], len(torque))
-    columns = _columns(Command, ("tau", "kp", "kd", "q_des", "v_des"), joints)
-    return Component(Command, columns, -high, high, lambda values: sign * values)
 
 
 def _tilt(quat_wxyz: Array) -> Array:
@@ -147,12 +148,28 @@ def parse_faults(
     Raises:
         ConfigError: the text does not follow the grammar, or names what there is not.
     """
-    parts = text.split(",") if text else ()
-    found = tuple(_parse(part.strip(), robots, components) for part in parts)
-    for fault in found:
-        if found.count(fault) > 1:
-            raise ConfigError(_KEY, f"{fault.robot}/{fault.detail} twice", "each fault once")
-    return found
+    found = list[ComponentFault]()
+    for part, words in read_items(_KEY, text, _GRAMMAR, (3, 4), separator=None):
+        robot, slash, component = words[0].partition("/")
+        if not slash:
+            raise ConfigError(_KEY, repr(part), _GRAMMAR)
+        for what, word, known in (
+            ("robot", robot, robots),
+            ("component", component, components),
+            ("kind", words[1], tuple(KINDS)),
+        ):
+            if word not in known:
+                hint = did_you_mean(word, known)
+                raise ConfigError(_KEY, f"{what} {word!r}", f"one of {', '.join(known)}", hint)
+        start, stop = round(1000 * read_number(_KEY, "start", words[2], part, 0.0, LATEST)), None
+        if len(words) == 4:
+            duration = read_number(_KEY, "duration", words[3], part, 1e-3, LATEST)
+            stop = start + round(1000 * duration)
+        fault = ComponentFault(robot, component, words[1], start, stop)
+        if fault in found:
+            raise ConfigError(_KEY, f"{robot}/{fault.detail} twice", "each fault once")
+        found.append(fault)
+    return tuple(found)
 
 
 def with_time(text: str, tick: int) -> str:
@@ -167,26 +184,6 @@ def with_time(text: str, tick: int) -> str:
     if len(words) not in (2, 3):
         raise ConfigError("fault", repr(text), "'robot/component kind [duration[s]]'")
     return " ".join([*words[:2], f"{1e-3 * (tick + _AHEAD_MS):.3f}", *words[2:]])
-
-
-def _parse(part: str, robots: tuple[str, ...], components: tuple[str, ...]) -> ComponentFault:
-    words = part.split()
-    if len(words) not in (3, 4) or "/" not in words[0]:
-        raise ConfigError(_KEY, repr(part), _GRAMMAR)
-    (robot, _, component), kind = words[0].partition("/"), words[1]
-    for what, word, known in (
-        ("robot", robot, robots),
-        ("component", component, components),
-        ("kind", kind, tuple(KINDS)),
-    ):
-        if word not in known:
-            hint = did_you_mean(word, known)
-            raise ConfigError(_KEY, f"{what} {word!r}", f"one of {', '.join(known)}", hint)
-    start = round(1000 * read_number(_KEY, "start", words[2], part, 0.0, LATEST))
-    if len(words) == 3:
-        return ComponentFault(robot, component, kind, start)
-    duration = read_number(_KEY, "duration", words[3], part, 1e-3, LATEST)
-    return ComponentFault(robot, component, kind, start, start + round(1000 * duration))
 
 
 class Distortion:
@@ -243,7 +240,7 @@ class Injection:
         self._components = build_components(config.robot)
         self._team, self._names = robot_names(config.team.robots), tuple(names)
         self._seed, self._count = config.world.seed, 0
-        self._distortions: dict[tuple[type[Flat], str], list[Distortion]] = {}
+        self._distortions: dict[type[Flat], list[tuple[int, Distortion]]] = {}
         self.events = self.add(config.world.faults)
 
     def add(self, text: str) -> list[Event]:
@@ -258,37 +255,22 @@ class Injection:
             parts = self._components[component] if robot in self._names else ()
             for part, of_part in enumerate(parts):
                 chance = np.random.default_rng((self._seed, _STREAM, self._count, part))
-                made = Distortion(fault, of_part, chance)
-                self._distortions.setdefault((of_part.message, robot), []).append(made)
+                made = self._names.index(robot), Distortion(fault, of_part, chance)
+                self._distortions.setdefault(of_part.message, []).append(made)
             self._count += 1
             found.append(Event.of(start, codes.FAULT_BEGINS, robot, fault.detail))
             if stop is not None:
                 found.append(Event.of(stop, codes.FAULT_ENDS, robot, f"{component} sound again"))
         return found
 
-    def distort_states(self, states: Mapping[str, State]) -> dict[str, State]:
-        """What faulty sensors make of the states of a tick, by robot; called once a tick."""
-        distorted = dict(states)
-        for (message, name), distortions in self._distortions.items():
-            if message is State:
-                tick, stamp_ns = states[name].tick, states[name].stamp_ns
-                row = _distort(states[name].row, tick, distortions)
-                distorted[name] = State.from_row(tick, stamp_ns, row)
-        return distorted
+    def distort(self, message: type[Flat], tick: int, rows: Array) -> None:
+        """Make of the robots' sound rows of a message what is faulty; once a tick, in place.
 
-    def distort_commands(self, tick: int, rows: Sequence[Array]) -> list[Array]:
-        """What faulty motors make of the robots' `Command`s, rows (60,); called once a tick."""
-        distorted = list(rows)
-        for (message, name), distortions in self._distortions.items():
-            if message is Command:
-                index = self._names.index(name)
-                distorted[index] = _distort(rows[index], tick, distortions)
-        return distorted
-
-
-def _distort(row: Array, tick: int, distortions: Sequence[Distortion]) -> Array:
-    row = row.copy()
-    for one in distortions:
-        columns = one.component.columns
-        row[columns] = one.distort(tick, row[columns])
-    return row
+        Args:
+            message: `State` for faulty sensors, `Command` for faulty motors.
+            tick: ms.
+            rows: of the robots, one below the other.
+        """
+        for robot, distortion in self._distortions.get(message, ()):
+            columns = distortion.component.columns
+            rows[robot, columns] = distortion.distort(tick, rows[robot, columns])

@@ -146,13 +146,11 @@ def _set_inertia(body: mujoco.MjsBody, link: ET.Element) -> None:
     body.mass = _mass(link)
     body.ipos = _origin(inertial)
     xx, yy, zz, xy, xz, yz = (float(tensor[k]) for k in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"))
-    body.fullinertia = [xx, yy, zz, xy, xz, yz]
     flat = np.empty(9)
     mujoco.mju_quat2Mat(flat, _rotation(inertial))
     R = flat.reshape(3, 3)
-    if not np.array_equal(R, np.eye(3)):  # else rounding would change it
-        turned = R @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ R.T
-        body.fullinertia = [*np.diag(turned), turned[0, 1], turned[0, 2], turned[1, 2]]
+    turned = R @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ R.T
+    body.fullinertia = [*np.diag(turned), turned[0, 1], turned[0, 2], turned[1, 2]]
 
 
 def _mass(link: ET.Element) -> float:

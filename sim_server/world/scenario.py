@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
@@ -29,7 +29,6 @@ _PUSH_NUMBERS: Final = (  # least and most; beyond 5000 N the world is no longer
     ("duration", 1e-3, LATEST),
 )
 _ANY: Final = "any"
-_STRENGTH: Final = "world.motor_strength"
 _JOINTS: Final = tuple(name.removesuffix("_joint") for name in JOINT_NAMES)
 
 
@@ -103,29 +102,19 @@ def build_scenario(config: Config, loads: Sequence[Load]) -> Scenario:
         events.append(Event.of(start, codes.WEAK_MOTOR, names[robot], detail))
     for push in sorted(pushes, key=lambda item: item.start):
         events += [Event.of(push.start, codes.PUSH, names[i], push.detail) for i in push.robots]
-    changes = {tick for push in pushes for tick in (push.start, push.stop)}
-    return Scenario(
-        forces={tick: _forces(pushes, tick, len(names)) for tick in changes},
-        strength={motor.start: _strength(weak, motor.start, len(names)) for motor in weak},
-        events=tuple(events),
-    )
-
-
-def _forces(pushes: Sequence[Push], tick: int, n: int) -> Array:
-    total = np.zeros((n, 3))
+    n = len(names)
+    forces = {tick: np.zeros((n, 3)) for push in pushes for tick in (push.start, push.stop)}
     for push in pushes:
-        if push.start <= tick < push.stop:
-            vector = [math.cos(push.direction), math.sin(push.direction), 0.0]
-            total[list(push.robots)] += push.force * np.array(vector)
-    return total
-
-
-def _strength(weak: Sequence[WeakMotor], tick: int, n: int) -> Array:
-    strength = np.ones((n, N_JOINTS))
+        vector = push.force * np.array([math.cos(push.direction), math.sin(push.direction), 0.0])
+        for tick, total in forces.items():
+            if push.start <= tick < push.stop:
+                total[list(push.robots)] += vector
+    strength = {motor.start: np.ones((n, N_JOINTS)) for motor in weak}
     for robot, joint, start, share in weak:
-        if start <= tick:
-            strength[robot, joint] = min(strength[robot, joint], share)
-    return strength
+        for tick, shares in strength.items():
+            if start <= tick:
+                shares[robot, joint] = min(shares[robot, joint], share)
+    return Scenario(forces, strength, tuple(events))
 
 
 def build_loads(config: Config) -> tuple[Load, ...]:
@@ -142,6 +131,17 @@ def build_loads(config: Config) -> tuple[Load, ...]:
         Load(world.payload * part / sum(parts), (x, y) if reach else (0.0, 0.0))
         for part, (x, y) in zip(parts, places, strict=True)
     )
+
+
+def read_items(
+    key: str, text: str, grammar: str, counts: Collection[int], separator: str | None = ":"
+) -> Iterator[tuple[str, list[str]]]:
+    """The items between commas, each with its words; `ConfigError` at another count of these."""
+    for item in text.split(",") if text else ():
+        words = [word.strip() for word in item.split(separator)]
+        if len(words) not in counts:
+            raise ConfigError(key, repr(item.strip()), grammar)
+        yield item.strip(), words
 
 
 def push_series(config: Config, random: np.random.Generator) -> tuple[Push, ...]:
@@ -173,14 +173,11 @@ def parse_pushes(text: str, names: tuple[str, ...]) -> tuple[Push, ...]:
         ConfigError: the text does not follow the grammar, or names a robot not in `names`.
     """
     pushes = list[Push]()
-    for part in text.split(",") if text else ():
-        robot, *numbers = (word.strip() for word in part.split(":"))
-        if len(numbers) != 4:
-            raise ConfigError("world.push", repr(part.strip()), _PUSH)
+    for part, (robot, *numbers) in read_items("world.push", text, _PUSH, (5,)):
         if robot != "all" and robot not in names:
             raise ConfigError("world.push", f"robot {robot!r}", f"'all' or one of {list(names)}")
         force, direction, start, duration = (
-            read_number("world.push", what, word, part.strip(), low, high)
+            read_number("world.push", what, word, part, low, high)
             for word, (what, low, high) in zip(numbers, _PUSH_NUMBERS, strict=True)
         )
         first, ms = round(start * 1000), round(duration * 1000)
@@ -210,13 +207,10 @@ def weak_motors(config: Config, random: np.random.Generator) -> tuple[WeakMotor,
     Raises:
         ConfigError: the text does not follow the grammar, or names no such robot or joint.
     """
-    key, text, names = _STRENGTH, config.world.motor_strength, robot_names(config.team.robots)
+    key, names = "world.motor_strength", robot_names(config.team.robots)
     weak = list[WeakMotor]()
-    for part in text.split(",") if text else ():
-        fields = [word.strip() for word in part.split(":")]
-        if len(fields) not in (3, 4):
-            raise ConfigError(key, repr(part.strip()), _MOTOR)
-        who, which, when, share = (*fields, _SHARE)[:4]
+    for part, words in read_items(key, config.world.motor_strength, _MOTOR, (3, 4)):
+        who, which, when, share = (*words, _SHARE)[:4]
         robots = [i for i, name in enumerate(names) if who in (name, _ANY)]
         joints = [i for i, name in enumerate(_JOINTS) if which in (name, *name.split("_"), _ANY)]
         if not robots:
@@ -225,8 +219,8 @@ def weak_motors(config: Config, random: np.random.Generator) -> tuple[WeakMotor,
             expected = f"'any', a part, a leg or {_JOINTS[0]}"
             cause = "parts are hip, thigh, calf; legs are FL, FR, RL, RR"
             raise ConfigError(key, f"joint {which!r}", expected, cause)
-        start = read_number(key, "start", when, part.strip(), 0.0, LATEST)
-        gives = read_number(key, "share", share, part.strip(), 0.0, 1.0)
+        start = read_number(key, "start", when, part, 0.0, LATEST)
+        gives = read_number(key, "share", share, part, 0.0, 1.0)
         robot, joint = int(random.choice(robots)), int(random.choice(joints))
         weak.append(WeakMotor(robot, joint, round(1000 * start), gives))
     return tuple(weak)

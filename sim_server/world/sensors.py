@@ -122,16 +122,9 @@ class Sensors:
     errors of encoders, attitude and feet have another stream each, so that they change no noise.
     """
 
-    def __init__(
-        self,
-        config: SensorsConfig,
-        seed: int,
-        names: tuple[str, ...],
-        indices: Sequence[int] | None = None,
-    ) -> None:
-        """Sensors of the robots `names`; `indices` are theirs in the team, by default 0, 1, …."""
-        self._names, n = names, len(names)
-        indices = range(n) if indices is None else indices
+    def __init__(self, config: SensorsConfig, seed: int, indices: Sequence[int]) -> None:
+        """Sensors of the robots with these indices in the team."""
+        n = len(indices)
         self._streams = [np.random.default_rng((seed, _STREAM, i)) for i in indices]
         others = [np.random.default_rng((seed, _STREAM, i, _ERRORS)) for i in indices]
         joints = config.joint_position, config.joint_velocity, config.joint_torque
@@ -147,16 +140,16 @@ class Sensors:
             self._yaw_rate[i] = config.yaw_drift * other.standard_normal()
         self._kind = _FOOT_SENSORS[config.foot_sensor]
         self._feet = FootSensors(config, others)
-        self._last = np.zeros((len(names), N_LEGS))  # what the feet's sensors read last
+        self._last = np.zeros((n, N_LEGS))  # what the feet's sensors read last
         self._next = _BLOCK  # row of the block that the next measurement takes
         self._noise, self._turns, self._unloaded = np.empty(0), np.empty(0), np.empty(0)
         self._faults: Faults = np.empty(0, dtype=np.int8)
 
-    def measure(self, tick: int, q: Array, v: Array, tau: Array, sensed: Array) -> dict[str, State]:
-        """The messages of one tick; every call draws fresh noise.
+    def measure(self, tick: int, q: Array, v: Array, tau: Array, sensed: Array) -> Array:
+        """The rows of the `State`s of one tick, (n, 50); every call draws fresh noise.
 
         Args:
-            tick: the messages' tick, ms.
+            tick: ms.
             q: true coordinates of each robot, trunk position and attitude first, (n, 19).
             v: true velocities, (n, 18): of the trunk, its rate in its own frame, of the joints.
             tau: true torques of the motors, before friction, (n, 12), N·m.
@@ -172,8 +165,7 @@ class Sensors:
             self._kind, self._feet.scale, self._unloaded[now], self._faults[now], self._last, rows
         )
         self._next += 1
-        stamp_ns = tick * 1_000_000
-        return {name: State.from_row(tick, stamp_ns, rows[i]) for i, name in enumerate(self._names)}
+        return rows
 
     def _draw(self) -> None:
         """Draw the next block: noise plus bias, (_BLOCK, n, 49), and turns, (_BLOCK, n, 4).

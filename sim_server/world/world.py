@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence
 from typing import Final
 
@@ -75,11 +76,10 @@ class World(Plant):
         self._scenario = build_scenario(config, self.team.payload)
         self._injection = Injection(config, self.names)
         self._live_faults = config.world.live_faults
-        announced = (*self._scenario.events, *self._injection.events)
-        self._events: dict[int, list[Event]] = {}
-        for event in announced:
+        self._events = defaultdict[int, list[Event]](list)
+        for event in (*self._scenario.events, *self._injection.events):
             if event.robot in ("", *self.names):
-                self._events.setdefault(event.tick, []).append(event)
+                self._events[event.tick].append(event)
         n = len(self.names)
         # Views of MuJoCo's own memory; behind the robots come the terrain's bodies.
         self._q = self.physics.qpos[: n * layout.NQ].reshape(n, layout.NQ)
@@ -90,8 +90,7 @@ class World(Plant):
         self.motors = Motors(config.robot, config.motors, n, _DAMPED)
         self._strength = np.ones((n, N_JOINTS))
         self._feet_under_hips = config.robot.feet_under_hips
-        self._fallen = [False] * n
-        self._down: tuple[str, ...] = ()  # names of these
+        self._down: tuple[str, ...] = ()  # names of those that have fallen
         self._stopped = frozenset[str]()  # names of those that an emergency stop damps
         self._excused = set[str]()  # with them, those that have not been up since
         self._lying = set[str]()  # of these, those that have gone to the ground
@@ -100,7 +99,7 @@ class World(Plant):
         Motors(config.robot, config.motors, n, _DAMPED).drive(
             np.zeros((n, len(_DAMPED.row))), self._q, self._v, self._strength
         )
-        self._sensors = Sensors(config.sensors, config.world.seed, self.names, self._indices)
+        self._sensors = Sensors(config.sensors, config.world.seed, self._indices)
 
         self.physics.qpos[:] = self.team.q_spawn
         mujoco.mj_forward(self.team.model, self.physics)
@@ -128,8 +127,8 @@ class World(Plant):
             self.physics.xfrc_applied[self.team.trunks, :3] = forces[self._indices]
         if (strength := self._scenario.strength.get(self.tick)) is not None:
             self._strength = strength[self._indices]
-        rows = [commands.get(name, _DAMPED).row for name in self.names]
-        rows = self._injection.distort_commands(self.tick, rows)
+        rows = np.array([commands.get(name, _DAMPED).row for name in self.names])
+        self._injection.distort(Command, self.tick, rows)
         self.motors.drive(self.motors.send(rows), self._q, self._v, self._strength)
         self._applied[:] = self.motors.joint_torque
         if not self._settled:  # and so nobody has asked for the truth of this tick
@@ -188,7 +187,7 @@ class World(Plant):
         """
         added = self._injection.add(fault)
         for event in added:
-            self._events.setdefault(event.tick, []).append(event)
+            self._events[event.tick].append(event)
         return tuple(Event.of(self.tick, FAULT_ASKED, e.robot, fault) for e in added[:1])
 
     def fallen(self) -> tuple[str, ...]:
@@ -200,10 +199,11 @@ class World(Plant):
         self._excused |= self._stopped
 
     def _measure(self) -> dict[str, State]:
-        states = self._sensors.measure(
-            self.tick, self._q, self._v, self.motors.torque, self._sensed
-        )
-        return self._injection.distort_states(states)
+        tick = self.tick
+        rows = self._sensors.measure(tick, self._q, self._v, self.motors.torque, self._sensed)
+        self._injection.distort(State, tick, rows)
+        stamp_ns = tick * 1_000_000
+        return {n: State.from_row(tick, stamp_ns, rows[i]) for i, n in enumerate(self.names)}
 
     def _read_yoke_force(self) -> Array:
         """Force of each yoke on its two robots, positive when it pushes them apart, N. Shape (k,).
@@ -228,7 +228,7 @@ class World(Plant):
                 if self._excused and z >= self._surely_up + _RISEN:
                     self._note_up(self.names[i])
                 continue
-            if self._fallen[i]:
+            if (name := self.names[i]) in self._down:
                 continue
             yaw = math.atan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
             # The mean under the hips, since the trunk may be over a block between the feet.
@@ -237,16 +237,13 @@ class World(Plant):
                     np.array(x), np.array(y), np.array(yaw), self._feet_under_hips
                 )
             )
-            name, level = self.names[i], cosine >= _FALL_COSINE
-            if level and above >= _FALL_HEIGHT:
+            if cosine >= _FALL_COSINE and above >= _FALL_HEIGHT:
                 if above >= _FALL_HEIGHT + _RISEN:
                     self._note_up(name)
                 continue
             detail = f"tilt {math.acos(max(-1.0, cosine)):.2f} rad, height {above:.3f} m"
             if name not in self._excused:
-                self._fallen[i] = True
-                pairs = zip(self.names, self._fallen, strict=True)
-                self._down = tuple(name for name, down in pairs if down)
+                self._down = tuple(n for n in self.names if n in (*self._down, name))
                 events.append(Event.of(self.tick, FALL, name, detail))
             elif name not in self._lying:
                 self._lying.add(name)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quadriga.bridges.limits import JointReading, joint_limits, limit_targets, shares_of_speed
+from quadriga.bridges.limits import joint_limits, limit_targets, shares_of_speed
 from quadriga.shared.robots.conventions import Array
 from quadriga.shared.unitree.codecs import A1
 from quadriga.shared.unitree.packets import MotorTargets
@@ -17,20 +17,19 @@ from tests.bridges.robots import config_of, holding
 
 CONFIG = config_of()
 LIMITS = joint_limits(CONFIG.bridge, CONFIG.robot)
-STILL = JointReading(CONFIG.robot.q_stand.copy(), np.zeros(12))
+STILL = CONFIG.robot.q_stand.copy(), np.zeros(12)
 EXTREME = st.one_of(st.floats(), st.floats(-1e3, 1e3))
 
 
-def given_torque(targets: MotorTargets, measured: JointReading) -> Array:
+def given_torque(targets: MotorTargets, q: Array, dq: Array) -> Array:
     """What a motor does with a command."""
-    torque: Array = targets.tau + targets.kp * (targets.q - measured.q)
-    torque += targets.kd * (targets.dq - measured.dq)
+    torque: Array = targets.tau + targets.kp * (targets.q - q) + targets.kd * (targets.dq - dq)
     return torque
 
 
 def test_a_command_within_the_limits_passes_unchanged() -> None:
     targets = holding(CONFIG, tau=np.linspace(-5.0, 5.0, 12))
-    limited = limit_targets(targets, STILL, np.zeros(12), 1, LIMITS)
+    limited = limit_targets(targets, *STILL, np.zeros(12), 1, LIMITS)
     assert limited.cut == ()
     for name in ("q", "dq", "tau", "kp", "kd"):
         np.testing.assert_allclose(getattr(limited.targets, name), getattr(targets, name))
@@ -47,17 +46,17 @@ def test_no_command_gives_more_than_the_limits(
     asked: list[float], q: list[float], dq: list[float], before: float, ms: int
 ) -> None:
     rows = np.array(asked).reshape(5, 12)
-    measured = JointReading(np.array(q), np.array(dq))
+    measured = np.array(q), np.array(dq)
     last = np.full(12, before)
     with np.errstate(over="ignore", invalid="ignore"):
         limited = limit_targets(
-            MotorTargets(holding(CONFIG).mode, *rows), measured, last, ms, LIMITS
+            MotorTargets(holding(CONFIG).mode, *rows), *measured, last, ms, LIMITS
         )
-    torque = given_torque(limited.targets, measured)
+    torque = given_torque(limited.targets, *measured)
     trusted = np.isfinite(shares_of_speed(*measured, LIMITS.speed, LIMITS))
     np.testing.assert_allclose(torque[trusted], limited.torque[trusted], rtol=1e-9, atol=1e-6)
     assert (np.abs(limited.torque) <= LIMITS.torque + 1e-6).all()
-    power = np.maximum(limited.torque * measured.dq, 0.0)[trusted].sum()
+    power = np.maximum(limited.torque * measured[1], 0.0)[trusted].sum()
     assert power <= LIMITS.power * (1 + 1e-9) + 1e-6
     assert (np.abs(limited.targets.tau) <= LIMITS.torque + 1e-6).all()
     on = limited.targets.kp > 0.0
@@ -75,10 +74,10 @@ def test_no_measurement_makes_the_feed_forward_torque_exceed_the_limits(
     q: list[float], dq: list[float], gain: float
 ) -> None:
     """The numbers of a sensor that fails must not come out as torque."""
-    measured = JointReading(np.array(q), np.array(dq))
+    measured = np.array(q), np.array(dq)
     targets = holding(CONFIG, kp=np.full(12, gain), kd=np.full(12, gain / 20.0))
     with np.errstate(over="ignore", invalid="ignore"):
-        limited = limit_targets(targets, measured, np.zeros(12), 1, LIMITS)
+        limited = limit_targets(targets, *measured, np.zeros(12), 1, LIMITS)
     wrong = np.isinf(shares_of_speed(*measured, LIMITS.speed, LIMITS))
     np.testing.assert_array_equal(limited.targets.kp[wrong], 0.0)
     assert (np.abs(limited.targets.tau) <= LIMITS.torque + 1e-9).all()
@@ -89,7 +88,7 @@ def test_no_measurement_makes_the_feed_forward_torque_exceed_the_limits(
 @given(tau=st.floats(-1e3, 1e3), before=st.floats(-20.0, 20.0), ms=st.integers(1, 4))
 def test_the_torque_changes_no_faster_than_allowed(tau: float, before: float, ms: int) -> None:
     targets = holding(CONFIG, tau=np.full(12, tau))
-    limited = limit_targets(targets, STILL, np.full(12, before), ms, LIMITS)
+    limited = limit_targets(targets, *STILL, np.full(12, before), ms, LIMITS)
     assert (np.abs(limited.torque - before) <= LIMITS.torque_rate * ms + 1e-9).all()
 
 
@@ -97,18 +96,18 @@ def test_the_torque_changes_no_faster_than_allowed(tau: float, before: float, ms
 def test_a_joint_at_its_end_is_pushed_no_further(end: str, push: float) -> None:
     q = getattr(LIMITS, end) + (0.01 if end == "upper" else -0.01)
     free = holding(CONFIG, q=q, tau=np.full(12, push), kp=np.zeros(12))
-    limited = limit_targets(free, JointReading(q, np.zeros(12)), np.zeros(12), 1, LIMITS)
+    limited = limit_targets(free, q, np.zeros(12), np.zeros(12), 1, LIMITS)
     np.testing.assert_array_equal(limited.torque, 0.0)
     assert "end-stop" in limited.cut
     away = replace(free, tau=np.full(12, -push))
-    back = limit_targets(away, JointReading(q, np.zeros(12)), np.zeros(12), 1, LIMITS)
+    back = limit_targets(away, q, np.zeros(12), np.zeros(12), 1, LIMITS)
     np.testing.assert_allclose(back.torque, -push)
 
 
 def test_every_limit_is_named() -> None:
     hard = {
         "finite": (holding(CONFIG, tau=np.full(12, np.nan)), STILL),
-        "measured": (holding(CONFIG), JointReading(STILL.q, np.full(12, 50.0))),
+        "measured": (holding(CONFIG), (STILL[0], np.full(12, 50.0))),
         "gain": (holding(CONFIG, kp=np.full(12, 1e4)), STILL),
         "position": (holding(CONFIG, q=np.full(12, 9.0)), STILL),
         "speed": (holding(CONFIG, dq=np.full(12, 99.0)), STILL),
@@ -116,8 +115,8 @@ def test_every_limit_is_named() -> None:
         "rate": (holding(CONFIG, tau=np.full(12, 20.0)), STILL),
         "power": (
             holding(CONFIG, tau=np.full(12, 28.0), kd=np.zeros(12)),
-            JointReading(STILL.q, np.full(12, 15.0)),
+            (STILL[0], np.full(12, 15.0)),
         ),
     }
     for name, (targets, measured) in hard.items():
-        assert name in limit_targets(targets, measured, np.zeros(12), 1, LIMITS).cut
+        assert name in limit_targets(targets, *measured, np.zeros(12), 1, LIMITS).cut

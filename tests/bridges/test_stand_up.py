@@ -14,7 +14,7 @@ from quadriga.shared.config.load import load
 from quadriga.shared.robots.conventions import Array
 from quadriga.shared.robots.registry import ROBOTS
 from quadriga.shared.unitree.packets import SERVO
-from quadriga.sim_server.emulator.robot_emulator import RobotStatus
+from quadriga.sim_server.emulator import command_of, report_of
 from quadriga.sim_server.world.world import World
 from tests.bridges.robots import holding
 
@@ -36,7 +36,6 @@ class Robot:
         self.world = World(self.config)
         self._supervisor = Supervisor(self.config.robot, self.config.bridge, SERVO)
         self.state = self._supervisor.initial(0, armed=True)
-        self._status = RobotStatus()
         self._on = holding(self.config)
         self.torque = 0.0
 
@@ -57,12 +56,12 @@ class Robot:
         for _ in range(15_000):
             tick = self.world.tick
             state, heat = self.world.states()["r1"], self.world.motors.heat[0]
-            report = self._status.report(state, heat, self._on)
+            report = report_of(state, heat, self._on)
             inputs = SupervisorInputs(now=tick, report=report, report_age=0, request=request)
             self.state, supervised = self._supervisor.step(self.state, inputs)
             if self.state.mode in (end, BridgeMode.ESTOP):
                 return
-            command = self._status.command(supervised.targets)
+            command = command_of(supervised.targets)
             self.world.step({} if command is None else {"r1": command})
             share = np.abs(self.world.motors.torque[0]) / self.config.robot.torque_limit
             self.torque = max(self.torque, float(share.max()))

@@ -74,20 +74,16 @@ def test_up_walk_and_down() -> None:
     ]
 
 
-def test_a_passive_robot_has_its_motors_off() -> None:
+def test_a_passive_robot_has_its_motors_off_and_a_walking_one_follows_its_agent() -> None:
     _, supervised = step(in_mode(BridgeMode.PASSIVE), at())
     assert supervised.targets is not None
     assert (supervised.targets.mode == OFF).all()
     np.testing.assert_array_equal(supervised.targets.kp, 0.0)
-
-
-def test_walking_passes_the_agents_command_on() -> None:
     _, supervised = step(in_mode(BridgeMode.WALK), at(request=Request.WALK, command_age=3))
-    targets = supervised.targets
-    assert targets is not None
-    np.testing.assert_allclose(targets.tau, COMMAND.tau)
-    np.testing.assert_allclose(targets.kp, COMMAND.kp)
-    assert (targets.mode == SERVO).all()
+    assert supervised.targets is not None
+    np.testing.assert_allclose(supervised.targets.tau, COMMAND.tau)
+    np.testing.assert_allclose(supervised.targets.kp, COMMAND.kp)
+    assert (supervised.targets.mode == SERVO).all()
 
 
 def test_a_late_agent_is_waited_for_with_the_joints_held_then_the_robot_stops() -> None:
@@ -109,12 +105,11 @@ def test_a_late_agent_is_waited_for_with_the_joints_held_then_the_robot_stops() 
     assert (supervised.targets.kd > 0.0).all()
 
 
-HOT = standing(CONFIG, temperature=np.full(12, 79.0))
 SICK = {
     "remote": standing(CONFIG, remote=pressing("L2", "B", "up")),
     "tilt": standing(CONFIG, quat_wxyz=tilted(0.95)),
     "motor-protected": standing(CONFIG, mode=np.array([SERVO] * 11 + [PROTECTED], np.uint8)),
-    "temperature": HOT,
+    "temperature": standing(CONFIG, temperature=np.full(12, 79.0)),
     "battery": standing(CONFIG, battery=Battery(9, -5.0, 20.0)),
     "joint-reading": standing(CONFIG, q=np.full(12, np.nan)),
 }

@@ -14,7 +14,7 @@ from quadriga.bridges.plant import RobotPlant
 from quadriga.shared.config.sections import BridgeConfig
 from quadriga.shared.errors import BridgeError, CheckError, ConfigError
 from quadriga.shared.unitree.codecs import A1, GO1
-from quadriga.shared.unitree.packets import OFF, SERVO, RobotReport
+from quadriga.shared.unitree.packets import OFF, SERVO
 from quadriga.shared.unitree.udp import Address, UdpPort
 from tests.bridges.robots import config_of, holding, standing
 
@@ -49,33 +49,29 @@ def link() -> Iterator[Link]:
     made.robot.close()
 
 
-def received(link: Link) -> RobotReport | None:
-    return link.driver.receive()
-
-
 def test_the_newest_report_counts(link: Link) -> None:
-    assert received(link) is None
+    assert link.driver.receive() is None
     for tick in (5, 6, 7):
         link.report(tick)
-    report = received(link)
+    report = link.driver.receive()
     assert report is not None
     assert report.tick == 7
     link.robot.close()
     for _ in range(3):  # a robot that is off costs no exception
         link.driver.send(holding(config_of()))
-        assert received(link) is None
+        assert link.driver.receive() is None
     counters = link.driver.counters
     assert (counters["received"], counters["sent"] + counters["unsent"]) == (3, 3)
 
 
 def test_repeated_older_and_damaged_packets_are_noticed_and_not_used(link: Link) -> None:
     link.report(10)
-    assert received(link) is not None
+    assert link.driver.receive() is not None
     link.report(10)
     link.report(9)
     link.robot.send(b"garbage")
     link.robot.send(GO1.encode_report(standing(config_of("go1"))))
-    assert received(link) is None
+    assert link.driver.receive() is None
     assert link.driver.counters == {"received": 1, "repeated": 1, "older": 1} | {
         "malformed": 2,
         "malformed_size": 2,
@@ -99,15 +95,15 @@ def test_a_robot_whose_packets_are_all_malformed_is_refused_with_their_reason(
 def test_the_counter_may_wrap_and_a_restarted_robot_is_followed(link: Link) -> None:
     for tick in (2**32 - 1, 0):
         link.report(tick)
-        report = received(link)
+        report = link.driver.receive()
         assert report is not None
         assert report.tick == tick
     link.report(2**30)
-    assert received(link) is not None
+    assert link.driver.receive() is not None
     ticks = []
     for tick in range(150):
         link.report(tick)
-        report = received(link)
+        report = link.driver.receive()
         ticks += [] if report is None else [report.tick]
     assert ticks == list(range(99, 150))
 

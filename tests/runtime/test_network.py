@@ -16,12 +16,12 @@ from quadriga.faults.catalogue import BY_NAME
 from quadriga.faults.fault import FaultScene
 from quadriga.faults.network.emulated import EmulatedNetwork
 from quadriga.faults.network.layout import TEAM, NetworkLayout
+from quadriga.faults.network.link import LinkFaults
 from quadriga.faults.network.order import RadioOrder
 from quadriga.faults.trial import draw_fault
 from quadriga.shared.config.load import load
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.members import OPERATOR
-from quadriga.sim_server.emulator.link import LinkFaults
 from quadriga.team.launch import Launch, process_table
 from tests.listening import await_true
 

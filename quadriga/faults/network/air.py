@@ -138,11 +138,11 @@ class _Air:
         return bool(read)
 
     def _deliver(self, arrivals: Iterable[Arrivals]) -> None:
-        for place, parcels in arrivals:
+        for place, packets in arrivals:
             device = self._devices[place]
-            for parcel in parcels:
+            for packet in packets:
                 with suppress(OSError):  # it is full, or what arrives is no packet any more
-                    os.write(device, parcel.packet)
+                    os.write(device, packet)
 
 
 def _read_packets(device: int) -> list[bytes]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import asdict, dataclass
 
-from quadriga.sim_server.emulator.link import LinkFaults
+from quadriga.faults.network.link import LinkFaults
 
 
 @dataclass(frozen=True, slots=True)

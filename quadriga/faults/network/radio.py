@@ -6,14 +6,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import permutations
 from typing import Final
 
+from quadriga.faults.network.link import NO_FAULTS, Link
 from quadriga.faults.network.order import RadioOrder
-from quadriga.sim_server.emulator.link import NO_FAULTS, Link, Parcel
 
 _IPV4: Final = 0x4  # the first half of a packet's first byte
 _LAST_OF_DESTINATION: Final = 19  # byte of an IPv4 header
 _SMALLEST: Final = 20  # bytes of that header
 
-Arrivals = tuple[str, Sequence[Parcel]]  # a place, and what arrives there
+Arrivals = tuple[str, Sequence[bytes]]  # a place, and what arrives there
 
 
 class Radio:
@@ -52,15 +52,15 @@ class Radio:
         Call `arrivals` before: what is due by now comes first.
         """
         self.carried += len(packets)
-        sorted_by = dict[str, list[Parcel]]()
+        sorted_by = dict[str, list[bytes]]()
         for packet in packets:
             receiver = self._receiver(packet)
             if receiver is None or receiver == sender:
                 self.foreign += 1
             else:
-                sorted_by.setdefault(receiver, []).append(Parcel(packet))
-        for receiver, parcels in sorted_by.items():
-            yield receiver, self._ways[sender, receiver].pass_on(parcels, now)
+                sorted_by.setdefault(receiver, []).append(packet)
+        for receiver, those in sorted_by.items():
+            yield receiver, self._ways[sender, receiver].pass_on(those, now)
 
     def arrivals(self, now: float) -> Iterator[Arrivals]:
         """What arrives by now, ms, of all that was sent before."""

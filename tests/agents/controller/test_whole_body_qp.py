@@ -245,7 +245,7 @@ def test_bounds_are_what_the_worlds_motors_give_but_never_less_than_a_quarter(ra
     bounds = torque_bounds(np.full(12, rate), motor_curves(A1, torque_speed=True))
     for row, tau in ((0, -99.0), (1, 99.0)):
         motors = Motors(A1, replace(IDEAL_MOTORS, torque_speed=True), 1, command())
-        sent, rates = motors.send([command(tau=tau).row]), np.full((1, 18), rate)
+        sent, rates = motors.send(command(tau=tau).row[None]), np.full((1, 18), rate)
         motors.drive(sent, np.zeros((1, 19)), rates, np.ones((1, 12)))
         least = 0.25 * A1.torque_limit * np.sign(tau)
         expected = np.where(np.abs(motors.torque[0]) < np.abs(least), least, motors.torque[0])

@@ -42,7 +42,6 @@ def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, 
         (["sim", "--set", "nonsense"], "expected section.key=value"),
         (["sim", "--config", "/nowhere/team.toml"], "/nowhere/team.toml: got No such file"),
         (["sim", "--hung"], "--hung: got no --as, expected --as with a kind of robot"),
-        (["sim", "--as", "a1", "--truth", "/nowhere/t.csv"], "/nowhere/t.csv: got No such file"),
         (
             ["sim", "--robot", "r1"],
             "--robot: got 'r1', expected nothing (team.plant_per_robot is false)",
@@ -78,10 +77,6 @@ def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, 
         ),
         (["report", "/nowhere"], "/nowhere/run.mcap: got No such file"),
         (
-            ["desk", "--fault", "remot-stop", "--mode", "realtime", *BRIDGED],
-            "--fault: got 'remot-stop'",
-        ),
-        (
             ["bridge", "--robot", "r1", "--restore", "normal", "--mode", "realtime", *BRIDGED],
             "--restore: got no --armed, expected --armed with it",
         ),
@@ -99,7 +94,6 @@ def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, 
             ],
             "--restore: got a team of Unitree A1, expected of Go2",
         ),
-        (["desk"], "team.plant: got 'mujoco', expected 'robots' (deploy/desk.toml is"),
         (["router", "--listen", "pigeon/roof"], "bus.endpoint 'pigeon/roof' of router"),
         (["operate", "--endpoint", "pigeon/roof"], "bus.endpoint 'pigeon/roof'"),
         (["record", "-o", "/proc/run.mcap"], "/proc/run.mcap"),
@@ -191,11 +185,6 @@ def test_who_reads_no_configuration_takes_none(
         (
             ["walk", "robots", "2"],
             "walk: got 'robots', expected nothing but options (did you mean '--robots'?)",
-        ),
-        (
-            ["desk", "x"],
-            "desk: got 'x', expected nothing but options "
-            "(`quadriga desk --help` tells what it takes)",
         ),
         (
             ["info", "run.mcap", "other.mcap"],

@@ -7,8 +7,9 @@ from typing import Any
 
 import pytest
 
+from quadriga.shared.config.load import load
 from quadriga.shared.errors import ConfigError
-from quadriga.team.trial_rows import ROWS, append_row, read_rows
+from quadriga.team.trial_rows import ROWS, append_row, keep_config, read_rows
 
 
 def test_rows_are_read_back_whatever_their_texts_hold(tmp_path: Path) -> None:
@@ -41,3 +42,10 @@ def test_a_file_that_is_no_text_is_one_error(tmp_path: Path) -> None:
     (tmp_path / ROWS).write_bytes(b"\xff\n")
     with pytest.raises(ConfigError, match=r"rows\.jsonl: got bytes that are not UTF-8"):
         read_rows(tmp_path)
+
+
+def test_a_folder_holds_walks_of_one_configuration_whatever_their_seed(tmp_path: Path) -> None:
+    keep_config(load(), tmp_path)
+    keep_config(load(overrides={"world.seed": 9}), tmp_path)
+    with pytest.raises(ConfigError, match=r"world.terrain = 'flat', not 'boxes', expected a new"):
+        keep_config(load(overrides={"world.terrain": "boxes"}), tmp_path)

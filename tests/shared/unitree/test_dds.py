@@ -49,7 +49,7 @@ def test_the_python_package_is_never_imported() -> None:
     """It would send type information for whatever is declared through it."""
     code = (
         "import sys; from quadriga.shared.unitree.dds import load_library; "
-        "import quadriga.bridges.drivers, quadriga.sim_server.emulator.robot_emulator; "
+        "import quadriga.bridges.drivers, quadriga.sim_server.emulator; "
         "load_library(); print(any(name.split('.')[0] == 'cyclonedds' for name in sys.modules))"
     )
     done = subprocess.run(

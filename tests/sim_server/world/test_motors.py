@@ -31,7 +31,7 @@ def motors(**changes: Any) -> Motors:
 
 def drive(of: Motors, asked: Command, q: float = 0.0, v: float = 0.0) -> Array:
     """Torques of the joints after a tick under a command, (12,), at equal angles and rates."""
-    arrived = of.send([asked.row])
+    arrived = of.send(asked.row[None])
     of.drive(arrived, np.full((1, 19), q), np.full((1, 18), v), SOUND)
     left: Array = of.joint_torque[0].copy()
     return left

@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.robots.conventions import JOINT_NAMES, robot_names
 from quadriga.sim_server.world.scenario import (
@@ -63,31 +62,6 @@ def test_pushes_add_up_and_end_and_are_announced_with_the_rest() -> None:
     assert events[-1].stamp_ns == 1_500_000_000
 
 
-def test_what_is_drawn_is_announced() -> None:
-    scenario = built(
-        3,
-        payload=6.0,
-        payload_on="r1:2,r3",
-        payload_scatter=0.05,
-        push_force=90.0,
-        motor_strength="r2:FL_calf:1.5:0.3",
-        terrain="slope",
-        duration=5.0,
-    )
-    (_, ground, *payloads, fault, push) = scenario.events
-    assert ground.detail == "slope of 8 deg up to 0.05 m, seed 0"
-    assert [(event.robot, event.detail.split(",")[0]) for event in payloads] == [
-        ("r1", "4 kg"),
-        ("r3", "2 kg"),
-    ]
-    assert all("mm ahead" in event.detail for event in payloads)
-    assert (fault.tick, fault.kind, fault.robot) == (1500, "fault", "r2")
-    assert fault.detail == "FL_calf gives 30 % of its torque"
-    assert push.kind == "push"
-    assert push.tick in scenario.forces
-    assert push.detail.startswith("90 N towards ")
-
-
 def test_a_motor_is_weak_from_its_tick_on_and_gives_what_is_announced() -> None:
     scenario = built(2, motor_strength="r2:FR_hip:2:0.5, r1:FL_hip:1:0.5")
     assert scenario.strength.keys() == {1000, 2000}
@@ -98,17 +72,20 @@ def test_a_motor_is_weak_from_its_tick_on_and_gives_what_is_announced() -> None:
     assert details == ["FR_hip gives 50 % of its torque", "FL_hip gives 50 % of its torque"]
 
 
-def masses(config: Config) -> list[float]:
-    return [load.mass for load in build_loads(config)]
-
-
-def test_a_load_is_shared_carried_by_one_or_by_some_with_shares_of_their_own() -> None:
-    assert masses(configured(4, payload=10.0)) == [2.5] * 4
-    assert masses(configured(3, payload=9.0, payload_on="r2")) == [0.0, 9.0, 0.0]
-    assert masses(configured(3, payload=9.0, payload_on="r2, r3")) == [0.0, 4.5, 4.5]
-    assert masses(configured(3, payload=10.0, payload_on="r1:6,r3:4")) == [6.0, 0.0, 4.0]
-    swept = masses(configured(3, payload=20.0, payload_on="r1:6,r3:4"))
-    assert swept == pytest.approx([12.0, 0.0, 8.0])
+@pytest.mark.parametrize(
+    ("on", "masses"),
+    [
+        ("team", [3.0, 3.0, 3.0]),
+        ("r2", [0.0, 9.0, 0.0]),
+        ("r2, r3", [0.0, 4.5, 4.5]),
+        ("r1:2,r3", [6.0, 0.0, 3.0]),
+    ],
+)
+def test_a_load_is_carried_by_all_or_by_some_with_shares_of_their_own(
+    on: str, masses: list[float]
+) -> None:
+    loads = build_loads(configured(3, payload=9.0, payload_on=on))
+    assert [load.mass for load in loads] == masses
 
 
 def test_a_load_lies_somewhere_else_with_another_seed_whoever_else_carries_something() -> None:
@@ -143,24 +120,30 @@ def test_pushes_are_parsed() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "message"),
+    ("key", "text", "message"),
     [
-        ("r1:80:0:1", "robot:force"),
-        ("r1:80:0:1:0.2:3", "robot:force"),
-        ("r9:80:0:1:0.2", "robot 'r9'"),
-        ("r1:strong:0:1:0.2", "force 'strong'"),
-        ("r1:nan:0:1:0.2", "force 'nan'"),
-        ("r1:1e9:0:1:0.2", "force '1e9'"),
-        ("r1:80:inf:1:0.2", "direction 'inf'"),
-        ("r1:80:0:-1:0.2", "start '-1'"),
-        ("r1:80:0:1:0", "duration '0'"),
-        ("r1:80:0:1:0.2,", "robot:force"),
-        (",", "robot:force"),
+        ("push", "r1:80:0:1", "robot:force"),
+        ("push", "r1:80:0:1:0.2:3", "robot:force"),
+        ("push", "r9:80:0:1:0.2", "robot 'r9'"),
+        ("push", "r1:strong:0:1:0.2", "force 'strong'"),
+        ("push", "r1:nan:0:1:0.2", "force 'nan'"),
+        ("push", "r1:1e9:0:1:0.2", "force '1e9'"),
+        ("push", "r1:80:inf:1:0.2", "direction 'inf'"),
+        ("push", "r1:80:0:-1:0.2", "start '-1'"),
+        ("push", "r1:80:0:1:0", "duration '0'"),
+        ("push", "r1:80:0:1:0.2,", "robot:force"),
+        ("motor_strength", "r1:calf", "robot:joint:start"),
+        ("motor_strength", "r4:calf:0", "robot 'r4'"),
+        ("motor_strength", "r1:knee:0", "joint 'knee'"),
+        ("motor_strength", "r1:calf:soon", "start 'soon'"),
+        ("motor_strength", "r1:calf:0,", "robot:joint:start"),
+        ("motor_strength", "r1:calf:0:0.5:1", "robot:joint:start"),
+        ("motor_strength", "r1:calf:0:1.5", "share '1.5'"),
     ],
 )
-def test_a_wrong_push_names_the_key_and_what_is_wrong(text: str, message: str) -> None:
-    with pytest.raises(ConfigError, match=rf"^world\.push: .*{message}"):
-        parse_pushes(text, NAMES)
+def test_a_wrong_text_names_the_key_and_what_is_wrong(key: str, text: str, message: str) -> None:
+    with pytest.raises(ConfigError, match=rf"^world\.{key}: .*{message}"):
+        built(3, **{key: text})
 
 
 @given(st.text(alphabet="rall0123:.,- e", max_size=30))
@@ -228,23 +211,3 @@ def test_what_is_left_open_is_drawn_from_the_seed(joint: str, among: set[str]) -
     assert {JOINT_NAMES[motor.joint] for motor in found} == among
     assert {motor.robot for motor in found} == {0, 1, 2}
     assert weak(f"any:{joint}:2", 7) == weak(f"any:{joint}:2", 7)
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("r1:calf", "robot:joint:start"),
-        ("r4:calf:0", "robot 'r4'"),
-        ("r1:knee:0", "joint 'knee'"),
-        ("r1:calf:soon", "start 'soon'"),
-        ("r1:calf:-1", "start '-1'"),
-        ("r1:calf:nan", "start 'nan'"),
-        ("r1:calf:0,", "robot:joint:start"),
-        ("r1:calf:0:0.5:1", "robot:joint:start"),
-        ("r1:calf:0:1.5", "share '1.5'"),
-        ("r1:calf:0:half", "share 'half'"),
-    ],
-)
-def test_a_wrong_motor_names_the_key_and_what_is_wrong(text: str, message: str) -> None:
-    with pytest.raises(ConfigError, match=rf"^world\.motor_strength: .*{message}"):
-        weak(text)

@@ -23,23 +23,29 @@ ARRAYS = [item.name for item in fields(State) if "shape" in item.metadata]
 N_CHANNELS = 46  # joint angles, rates and torques, gyro, accelerometer, feet
 
 
-def measure(sensors: Sensors, tick: int, channels: Array, quat: Array) -> dict[str, State]:
-    """The messages of robots of which the sensors see `channels`, (n, 46)."""
+def measure(sensors: Sensors, tick: int, channels: Array, quat: Array) -> list[State]:
+    """What robots say of which the sensors see `channels`, (n, 46)."""
     place = np.zeros((len(channels), 3))
     q = np.concatenate([place, quat, channels[:, :12]], axis=1)
     v = np.concatenate([place, channels[:, 36:39], channels[:, 12:24]], axis=1)
     tau, sensed = channels[:, 24:36].copy(), channels[:, 36:].copy()
-    return sensors.measure(tick, q, v, tau, sensed)
+    return [State.from_row(tick, 0, row) for row in sensors.measure(tick, q, v, tau, sensed)]
+
+
+def attitudes(n: int) -> Array:
+    """Random unit quaternions, (n, 4)."""
+    quats: Array = np.random.default_rng(5).standard_normal((n, 4))
+    quats /= np.linalg.norm(quats, axis=1, keepdims=True)
+    return quats
 
 
 def record(config: SensorsConfig, ticks: int, n: int = 1, seed: int = 0) -> dict[str, np.ndarray]:
     """Every field of the last robot's messages over time, for zero motion and 100 N per foot."""
-    names = tuple(f"r{i + 1}" for i in range(n))
-    sensors = Sensors(config, seed, names)
+    sensors = Sensors(config, seed, range(n))
     channels = np.zeros((n, N_CHANNELS))
     channels[:, -4:] = 100.0
     quat = np.tile(LEVEL, (n, 1))
-    states = [measure(sensors, tick, channels, quat)[names[-1]] for tick in range(ticks)]
+    states = [measure(sensors, tick, channels, quat)[-1] for tick in range(ticks)]
     return {name: np.array([getattr(state, name) for state in states]) for name in ARRAYS}
 
 
@@ -74,13 +80,12 @@ def test_bias_is_drawn_once_per_run_and_robot() -> None:
 
 
 def test_noise_of_a_robot_does_not_depend_on_the_others() -> None:
-    names = ("r1", "r2", "r3")
-    large, small = Sensors(CONFIG, 5, names), Sensors(CONFIG, 5, names[:2])
+    large, small = Sensors(CONFIG, 5, range(3)), Sensors(CONFIG, 5, range(2))
     random = np.random.default_rng(0)
     channels, quat = random.standard_normal((3, N_CHANNELS)), np.tile(LEVEL, (3, 1))
     for tick in range(130):
-        a = measure(large, tick, channels, quat)["r2"]
-        b = measure(small, tick, channels[:2], quat[:2])["r2"]
+        a = measure(large, tick, channels, quat)[1]
+        b = measure(small, tick, channels[:2], quat[:2])[1]
         for name in ARRAYS:
             np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
     one, other = record(CONFIG, 1, n=1)["q_joint"], record(CONFIG, 1, n=2)["q_joint"]
@@ -88,14 +93,9 @@ def test_noise_of_a_robot_does_not_depend_on_the_others() -> None:
 
 
 def test_without_noise_the_truth_passes_through() -> None:
-    random = np.random.default_rng(1)
-    channels = random.standard_normal((2, N_CHANNELS))
+    channels, quat = np.random.default_rng(1).standard_normal((2, N_CHANNELS)), attitudes(2)
     channels[:, -4:] = np.abs(channels[:, -4:])
-    quat = random.standard_normal((2, 4))
-    quat /= np.linalg.norm(quat, axis=1, keepdims=True)
-    states = measure(Sensors(SILENT, 0, ("r1", "r2")), 7, channels, quat)
-    for i, state in enumerate(states.values()):
-        assert (state.tick, state.stamp_ns) == (7, 7_000_000)
+    for i, state in enumerate(measure(Sensors(SILENT, 0, range(2)), 7, channels, quat)):
         body = [state.q_joint, state.v_joint, state.tau_joint, state.imu_gyro, state.imu_accel]
         np.testing.assert_array_equal(np.concatenate([*body, state.foot_force]), channels[i])
         np.testing.assert_allclose(state.imu_quat_wxyz, quat[i], atol=1e-15)
@@ -103,11 +103,11 @@ def test_without_noise_the_truth_passes_through() -> None:
 
 def counts_under(config: SensorsConfig, forces: Array, seed: int = 0) -> Array:
     """What a robot's feet read in ticks of these forces, (ticks, 4)."""
-    sensors, channels = Sensors(config, seed, ("r1",)), np.zeros((1, N_CHANNELS))
+    sensors, channels = Sensors(config, seed, range(1)), np.zeros((1, N_CHANNELS))
     read = []
     for tick, force in enumerate(forces):
         channels[0, -4:] = force
-        read.append(measure(sensors, tick, channels, LEVEL[None])["r1"].foot_force)
+        read.append(measure(sensors, tick, channels, LEVEL[None])[0].foot_force)
     return np.array(read)
 
 
@@ -177,15 +177,10 @@ def test_foot_sensors_that_cannot_pull_or_are_absent() -> None:
 
 
 def test_a_tilt_is_a_rotation_in_the_trunk_frame() -> None:
-    random = np.random.default_rng(5)
-    for seed in range(20):
-        quat = random.standard_normal(4)
-        quat /= np.linalg.norm(quat)
-        sensors = Sensors(replace(SILENT, orientation_bias=0.1), seed, ("r1",))
+    for seed, quat in enumerate(attitudes(20)):
+        sensors = Sensors(replace(SILENT, orientation_bias=0.1), seed, range(1))
         zero = np.zeros((1, N_CHANNELS))
-        turned, level = (
-            measure(sensors, t, zero, q[None])["r1"] for t, q in ((0, quat), (1, LEVEL))
-        )
+        turned, level = (measure(sensors, t, zero, q[None])[0] for t, q in ((0, quat), (1, LEVEL)))
         R, tilt = (pin.Quaternion(*q).toRotationMatrix() for q in (quat, level.imu_quat_wxyz))
         found = pin.Quaternion(*turned.imu_quat_wxyz).toRotationMatrix()
         np.testing.assert_allclose(found, R @ tilt, atol=1e-12)
@@ -207,12 +202,10 @@ def test_encoders_and_attitude_have_errors_that_stay() -> None:
 
 def test_yaw_drifts_about_the_vertical_whatever_the_attitude() -> None:
     quiet = replace(SILENT, yaw_drift=0.1)
-    random = np.random.default_rng(3)
-    quat = random.standard_normal(4)
-    quat /= np.linalg.norm(quat)
-    measured = measure(Sensors(quiet, 0, ("r1",)), 2000, np.zeros((1, N_CHANNELS)), quat[None])
+    (quat,) = attitudes(1)
+    (measured,) = measure(Sensors(quiet, 0, range(1)), 2000, np.zeros((1, N_CHANNELS)), quat[None])
     R = pin.Quaternion(*quat).toRotationMatrix()
-    turned = pin.Quaternion(*measured["r1"].imu_quat_wxyz).toRotationMatrix()
+    turned = pin.Quaternion(*measured.imu_quat_wxyz).toRotationMatrix()
     turn = pin.log3(turned @ R.T)
     np.testing.assert_allclose(turn[:2], 0.0, atol=1e-12)
     assert abs(turn[2]) > 0.01

@@ -7,7 +7,6 @@ import pytest
 
 from quadriga.plant.commands import MOTOR_DAMPING
 from quadriga.shared.codec import decode, encode
-from quadriga.shared.config.sections import Config
 from quadriga.shared.messages import Event, Truth
 from quadriga.shared.robots.a1 import A1
 from quadriga.shared.robots.conventions import GRAVITY, N_JOINTS, Array
@@ -31,9 +30,8 @@ def test_standing_team_stays_up_and_the_ground_carries_its_weight(n: int) -> Non
 def test_yoke_force_is_negative_when_the_yoke_pulls() -> None:
     world = World(configured(2, push="r1:30:90:0:1,r2:30:-90:0:1"))  # apart, along the yoke
     stand(world, 700)
-    truth = world.truth()
-    assert truth.yoke_force[0] < -10.0
-    assert 0.0 < truth.yoke_error[0] < 1e-3
+    assert world.truth().yoke_force[0] < -10.0
+    assert 0.0 < world.truth().yoke_error[0] < 1e-3
 
 
 def test_equal_configurations_and_commands_give_equal_bytes() -> None:
@@ -112,23 +110,12 @@ def test_motor_law_is_followed_and_limited() -> None:
     world = World(configured(1))
     stand(world, 10)
     random = np.random.default_rng(0)
-    values = {
-        name: random.uniform(low, high, N_JOINTS)
-        for name, low, high in (
-            ("tau", -40, 40),
-            ("q_des", -2, 2),
-            ("v_des", -3, 3),
-            ("kp", 0, 20),
-            ("kd", 0, 2),
-        )
-    }
+    low = np.array([[-40.0], [-2.0], [-3.0], [0.0], [0.0]])
+    high = np.array([[40.0], [2.0], [3.0], [20.0], [2.0]])
+    tau, q_des, v_des, kp, kd = random.uniform(low, high, (5, N_JOINTS))
     before = world.states()["r1"]
-    world.step({"r1": command(**values)})
-    wanted = (
-        values["tau"]
-        + values["kp"] * (values["q_des"] - before.q_joint)
-        + values["kd"] * (values["v_des"] - before.v_joint)
-    )
+    world.step({"r1": command(tau=tau, q_des=q_des, v_des=v_des, kp=kp, kd=kd)})
+    wanted = tau + kp * (q_des - before.q_joint) + kd * (v_des - before.v_joint)
     assert (np.abs(wanted) > TORQUE_LIMIT).any()
     expected = np.clip(wanted, -TORQUE_LIMIT, TORQUE_LIMIT)
     np.testing.assert_allclose(world.states()["r1"].tau_joint, expected, atol=1e-12)
@@ -255,50 +242,35 @@ def test_when_a_tick_is_settled_changes_nothing() -> None:
 PUSHES = "r1:60:90:0.01:0.05,r2:60:0:0.02:0.05"
 
 
-@pytest.fixture
-def apart() -> Config:
-    return configured(
-        3, yokes="none", noise=True, push=PUSHES, scatter=0.1, payload=2.0, payload_on="r2:1"
-    )
-
-
-def own(truth: Truth, robot: str) -> Array:
-    place: Array = truth.base_pos[truth.robots.index(robot)]
-    return place
-
-
-def test_it_starts_at_its_place_with_its_own_noise(apart: Config) -> None:
-    together = World(apart)
-    for name in together.names:
-        alone = World(apart, (name,))
-        assert alone.names == (name,)
-        np.testing.assert_array_equal(own(alone.truth(), name), own(together.truth(), name))
-        np.testing.assert_allclose(alone.states()[name].row, together.states()[name].row, atol=1e-9)
-
-
-def test_it_moves_as_it_would_beside_the_others(apart: Config) -> None:
-    together, calm = World(apart), World(replace(apart, world=replace(apart.world, push="")))
-    alone = {name: World(apart, (name,)) for name in together.names}
+def test_a_robot_in_a_world_of_its_own_fares_as_beside_the_others() -> None:
+    """It has its place, noise, pushes and events, and none of the others' events."""
+    keys = {"scatter": 0.1, "payload": 2.0, "payload_on": "r2:1"}
+    config = configured(3, yokes="none", noise=True, push=PUSHES, **keys)  # type: ignore[arg-type]
+    together = World(config)
+    calm = World(replace(config, world=replace(config.world, push="")))
+    alone = {name: World(config, (name,)) for name in together.names}
+    for name, world in alone.items():
+        assert world.names == (name,)
+        np.testing.assert_array_equal(own(world, name), own(together, name))
+        np.testing.assert_allclose(world.states()[name].row, together.states()[name].row, atol=1e-9)
     stand(together, 100)
     stand(calm, 100)
+    told = dict[str, list[tuple[str, str]]]()
     for name, world in alone.items():
-        stand(world, 100)
-        place = own(world.truth(), name)
-        np.testing.assert_allclose(place, own(together.truth(), name), atol=1e-4)
-        pushed = np.abs(place - own(calm.truth(), name)).max() > 1e-3
+        events = [event for _ in range(100) for event in world.step({name: STAND})]
+        told[name] = [(event.kind, event.robot) for event in events]
+        np.testing.assert_allclose(own(world, name), own(together, name), atol=1e-4)
+        pushed = np.abs(own(world, name) - own(calm, name)).max() > 1e-3
         assert pushed == (name in PUSHES)
+    assert told["r1"] == [("start", ""), ("terrain", ""), ("push", "r1")]
+    assert told["r2"] == [("start", ""), ("terrain", ""), ("payload", "r2"), ("push", "r2")]
+    assert told["r3"] == [("start", ""), ("terrain", "")]
 
 
-def test_what_happens_to_others_is_none_of_its_events(apart: Config) -> None:
-    events = {
-        name: [event for _ in range(100) for event in world.step({})]
-        for name in ("r1", "r2", "r3")
-        for world in [World(apart, (name,))]
-    }
-    found = {name: [(e.kind, e.robot) for e in of] for name, of in events.items()}
-    assert found["r1"] == [("start", ""), ("terrain", ""), ("push", "r1")]
-    assert found["r2"] == [("start", ""), ("terrain", ""), ("payload", "r2"), ("push", "r2")]
-    assert found["r3"] == [("start", ""), ("terrain", "")]
+def own(world: World, robot: str) -> Array:
+    truth = world.truth()
+    place: Array = truth.base_pos[truth.robots.index(robot)]
+    return place
 
 
 def test_yokes_are_those_between_the_robots_that_are_there() -> None:

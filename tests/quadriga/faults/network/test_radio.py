@@ -6,9 +6,9 @@ from collections.abc import Iterable
 
 import pytest
 
+from quadriga.faults.network.link import LinkFaults
 from quadriga.faults.network.order import RadioOrder
 from quadriga.faults.network.radio import Arrivals, Radio
-from quadriga.sim_server.emulator.link import LinkFaults
 
 HOSTS = {254: "team", 1: "r1", 2: "r2"}
 GONE = LinkFaults(loss=1.0)
@@ -22,7 +22,7 @@ def packet(host: int, number: int = 0) -> bytes:
 
 
 def received(arrivals: Iterable[Arrivals]) -> list[tuple[str, bytes]]:
-    return [(place, parcel.packet) for place, parcels in arrivals for parcel in parcels]
+    return [(place, packet) for place, packets in arrivals for packet in packets]
 
 
 def test_packets_come_where_they_are_addressed_in_their_order() -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -31,13 +31,6 @@ class LinkFaults:
 NO_FAULTS: Final = LinkFaults()
 
 
-class Parcel(NamedTuple):
-    """A packet, and who sent it where that is known."""
-
-    packet: bytes
-    sender: tuple[str, int] | None = None
-
-
 class Link:
     """See this module; chance comes from `seed`.
 
@@ -49,18 +42,18 @@ class Link:
         self.faults = NO_FAULTS
         self._chance = np.random.default_rng(tuple(seed))
         self._damage_chance = np.random.default_rng((*seed, _DAMAGE))
-        self._way = deque[tuple[float, Parcel]]()  # when each arrives, ms, rising
-        self._overtaken: list[Parcel] = []  # by the next packet
+        self._way = deque[tuple[float, bytes]]()  # when each arrives, ms, rising
+        self._overtaken: list[bytes] = []  # by the next packet
 
-    def pass_on(self, parcels: Sequence[Parcel], now: float) -> Sequence[Parcel]:
+    def pass_on(self, packets: Sequence[bytes], now: float) -> Sequence[bytes]:
         """Send packets into it now, ms, and take those that arrive by now.
 
-        Where nothing is asked for it gives the `parcels` themselves.
+        Where nothing is asked for it gives the `packets` themselves.
         """
         if self.faults is NO_FAULTS and not self._way and not self._overtaken:
-            return parcels
-        for parcel in parcels:
-            self._send(parcel, now)
+            return packets
+        for packet in packets:
+            self._send(packet, now)
         arrived = []
         while self._way and self._way[0][0] <= now:
             arrived.append(self._way.popleft()[1])
@@ -71,14 +64,14 @@ class Link:
         """When the next packet on its way arrives, ms; infinity: none is on its way."""
         return self._way[0][0] if self._way else float("inf")
 
-    def _send(self, parcel: Parcel, now: float) -> None:
+    def _send(self, packet: bytes, now: float) -> None:
         faults = self.faults
         lost, twice, swapped, damaged = self._chance.random(4).tolist()
         if lost < faults.loss:
             return
         if damaged < faults.garbage:
-            parcel = parcel._replace(packet=self._damage(parcel.packet))
-        copies = [parcel] * (2 if twice < faults.duplicate else 1)
+            packet = self._damage(packet)
+        copies = [packet] * (2 if twice < faults.duplicate else 1)
         if not self._overtaken and swapped < faults.reorder:
             self._overtaken = copies
             return

@@ -9,18 +9,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from quadriga.faults.network.link import Link, LinkFaults
 from quadriga.shared.unitree.codecs import GO2
 from quadriga.shared.unitree.packets import ON, MotorTargets, PacketError
-from quadriga.sim_server.emulator.link import Link, LinkFaults, Parcel
 
 N = 4000
-SENDER = ("127.0.0.1", 8007)
-PACKETS = [Parcel(f"packet {k:06}".encode(), SENDER) for k in range(N)]
+PACKETS = [f"packet {k:06}".encode() for k in range(N)]
 
 
-def run(faults: LinkFaults, count: int = N, seed: int = 0) -> list[tuple[int, Parcel]]:
+def run(faults: LinkFaults, count: int = N, seed: int = 0) -> list[tuple[int, bytes]]:
     """One packet each ms, then a second of waiting: when what arrived."""
-    link, arrived = Link((seed, 1)), list[tuple[int, Parcel]]()
+    link, arrived = Link((seed, 1)), list[tuple[int, bytes]]()
     link.faults = faults
     for now in range(count + 1000):
         arrived += [(now, got) for got in link.pass_on(PACKETS[:count][now : now + 1], now)]
@@ -32,14 +31,14 @@ some_faults = st.builds(LinkFaults, shares, shares, shares, shares, st.floats(0.
 
 
 def test_without_faults_the_very_packets_are_handed_on() -> None:
-    link, parcels = Link((0,)), tuple(PACKETS[:3])
-    assert link.pass_on(parcels, 0) is parcels
+    link, packets = Link((0,)), tuple(PACKETS[:3])
+    assert link.pass_on(packets, 0) is packets
     link.faults = LinkFaults(delay=5.0)
-    assert link.pass_on(parcels, 1) == []
+    assert link.pass_on(packets, 1) == []
     link.faults = LinkFaults()
     assert link.next_arrival == 6.0
-    assert link.pass_on((), 6) == list(parcels), "what is on its way keeps its delay"
-    assert link.pass_on(parcels, 2000) == list(parcels)
+    assert link.pass_on((), 6) == list(packets), "what is on its way keeps its delay"
+    assert link.pass_on(packets, 2000) == list(packets)
 
 
 @given(some_faults, st.integers(0, 100))
@@ -48,8 +47,8 @@ def test_equal_seeds_give_equal_arrivals_none_early_or_of_nowhere(
 ) -> None:
     assert run(faults, 100, seed) == run(faults, 100, seed)
     arrived = run(replace(faults, garbage=0.0), 100, seed)
-    sent = {parcel: now for now, parcel in enumerate(PACKETS[:100])}
-    assert all(now >= sent[parcel] + faults.delay for now, parcel in arrived)
+    sent = {packet: now for now, packet in enumerate(PACKETS[:100])}
+    assert all(now >= sent[packet] + faults.delay for now, packet in arrived)
     assert len(arrived) <= 200
     assert [now for now, _ in arrived] == sorted(now for now, _ in arrived)
 
@@ -69,12 +68,12 @@ def test_the_share_asked_for_is_lost_or_repeated_or_damaged(share: float) -> Non
 
 @given(st.floats(0.0, 50.0), st.integers(0, 10))
 def test_a_delay_is_kept_to_the_millisecond(delay: float, seed: int) -> None:
-    expected = [(int(np.ceil(k + delay)), parcel) for k, parcel in enumerate(PACKETS[:60])]
+    expected = [(int(np.ceil(k + delay)), packet) for k, packet in enumerate(PACKETS[:60])]
     assert run(LinkFaults(delay=delay), 60, seed) == expected
 
 
 def test_swapped_packets_change_places_with_the_next() -> None:
-    order = [int(got.packet[-6:]) for _, got in run(LinkFaults(reorder=0.3))]
+    order = [int(got[-6:]) for _, got in run(LinkFaults(reorder=0.3))]
     assert sorted(order) in ([*range(N)], [*range(N - 1)]), "at most the last one still waits"
     assert {got - k for k, got in enumerate(order)} == {-1, 0, 1}
     pairs = [k for k in range(len(order) - 1) if order[k] > order[k + 1]]
@@ -84,11 +83,10 @@ def test_swapped_packets_change_places_with_the_next() -> None:
 def test_no_codec_takes_a_damaged_packet() -> None:
     zero, link = np.zeros(12), Link((0, 1))
     targets = MotorTargets(np.full(12, ON, np.uint8), zero, zero, zero, zero, zero + 3.0)
-    parcel = Parcel(GO2.encode_command(targets), SENDER)
+    packet = GO2.encode_command(targets)
     link.faults = LinkFaults(garbage=1.0)
     for now in range(300):
-        (got,) = link.pass_on((parcel,), now)
-        assert got.sender == SENDER
+        (got,) = link.pass_on((packet,), now)
         with pytest.raises(PacketError):
-            GO2.decode_command(got.packet)
-    assert link.pass_on((Parcel(b""),), 300) == [Parcel(b"")], "an empty one can be sent"
+            GO2.decode_command(got)
+    assert link.pass_on((b"",), 300) == [b""], "an empty one can be sent"

@@ -1,1 +1,0 @@
-"""The hardware path on one machine: simulated robots behind their own protocols, and the team."""

@@ -1,1 +1,0 @@
-"""Emulated robots: the simulated team behind the robots' own protocols, for bridges."""
