@@ -5,7 +5,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -20,7 +19,6 @@ from quadriga.agents.predictor.episode import (
     team_layout,
     wrench_map,
 )
-from quadriga.agents.predictor.measured_response import fit_measured_response, read_pulse_responses
 from quadriga.agents.predictor.periodic import Period, PeriodicFactors, fit_periodic
 from quadriga.agents.predictor.regression import (
     check_excitation,
@@ -286,7 +284,12 @@ def check_sizes(config: Config, predictor: Predictor) -> None:
 # ---- fits
 
 
-def fit(episodes: Sequence[Episode], meta: PredictorMeta, wrench: Array | None = None) -> Predictor:
+def fit(
+    episodes: Sequence[Episode],
+    meta: PredictorMeta,
+    wrench: Array | None = None,
+    response: Array | None = None,
+) -> Predictor:
     """The fit that `meta.kind` names.
 
     - pinv: G = Y_f [U_p; Y_p; U_f]† (eq. 6).
@@ -294,27 +297,22 @@ def fit(episodes: Sequence[Episode], meta: PredictorMeta, wrench: Array | None =
       with M columns: effects that the data do not clearly show are not attributed to the peers.
       Without this weight the agents' best responses to each other's last plans diverge.
     - periodic: a function of the phase in which no input acts backwards, see `periodic`; of a team
-      that of the gait, with peers by their net wrench. Measured responses stand for fitted ones if
-      there is a file of them.
+      that of the gait, with peers by their net wrench.
 
     Args:
         episodes: of the plant.
         meta: what is fitted.
         wrench: of `periodic`, from an agent's inputs to what they act by, (w, m); None: of the
             robot.
+        response: of `periodic`, what stands for a fitted one, see `fit_periodic`.
 
     Raises:
         PredictorError: no data, too little, of another plant, or a singular problem.
-        PredictorFileError: the file of measured responses cannot be read, or is another team's.
     """
     layout = meta.layout
     if meta.kind == "periodic":
         check_episodes(episodes, layout)
         B = wrench_map(meta.robot) if wrench is None else wrench
-        response = None
-        if meta.response:
-            measured = read_pulse_responses(Path(meta.response))
-            response = fit_measured_response(measured, layout, meta.period, B)
         factors = fit_periodic(episodes, layout, meta.period, B, response)
         phases = max(1, meta.period.ticks // meta.period.sample)
         return Predictor(replace(meta, phases=phases), factors)

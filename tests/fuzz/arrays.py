@@ -13,23 +13,20 @@ from typing import Any, Final
 
 import numpy as np
 
-from quadriga.agents.predictor.episode import Episode, check_episodes, team_layout, wrench_map
+from quadriga.agents.predictor.episode import Episode, check_episodes, team_layout
 from quadriga.agents.predictor.gates import GateReport, Provenance, read
-from quadriga.agents.predictor.measured_response import (
-    PulseResponses,
-    fit_measured_response,
-    read_pulse_responses,
-    write_pulse_responses,
-)
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.predictor.store import predictor_sha256, save
+from quadriga.experiments.probe.measured_response import write_measured_response
 from quadriga.experiments.probe.responses import (
     Repetition,
+    Responses,
     average,
     read_repetition,
     write_repetition,
 )
 from quadriga.identification.dataset import Dataset, read_data, write_data
+from quadriga.identification.predictors import read_response
 from quadriga.replay import saved_qp
 from quadriga.replay.saved_qp import SavedQp
 from quadriga.shared.config.load import load
@@ -150,19 +147,18 @@ def datasets(folder: Path) -> Archives:
     return Archives(folder / "data.npz", lambda path: write_data(path, whole), read_all)
 
 
-def pulse_responses(folder: Path) -> Archives:
-    """Responses that a probe has measured, as a predictor is made of them."""
-    meta = PredictorMeta.of(load(None, SMALL))
+def measured_responses(folder: Path) -> Archives:
+    """The response that a probe has measured, as a predictor is made of it."""
+    path = folder / "responses.npz"
+    config = load(None, SMALL | {"identification.response": str(path)})
     random = np.random.default_rng(0)
-    u, y = random.normal(size=(2, 1, 6, meta.N, 12)), random.normal(size=(2, 1, 6, meta.N, 1, 6))
-    responses, wrench = PulseResponses(np.array([0, 100]), u, y, {}), wrench_map(meta.robot)
+    u, y = random.normal(size=(2, 1, 5, 8, 12)), random.normal(size=(2, 1, 5, 8, 1, 6))
+    responses = Responses((0,), np.array([0, 100]), u, y, 0.0 * y, 0, 10)
 
-    def read_all(path: Path) -> None:
-        fit_measured_response(read_pulse_responses(path), meta.layout, meta.period, wrench)
+    def write(path: Path) -> None:
+        write_measured_response(path, responses, config)
 
-    return Archives(
-        folder / "responses.npz", lambda path: write_pulse_responses(path, responses), read_all
-    )
+    return Archives(path, write, lambda path: read_response(config))
 
 
 def repetitions(folder: Path) -> Archives:

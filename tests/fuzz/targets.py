@@ -30,7 +30,7 @@ KINDS: Final[Mapping[str, Callable[[Path], Target]]] = {
     "json-rows": campaigns.json_rows,
     "predictors": arrays.predictors,
     "datasets": arrays.datasets,
-    "pulse-responses": arrays.pulse_responses,
+    "pulse-responses": arrays.measured_responses,
     "repetitions": arrays.repetitions,
     "saved-programs": arrays.saved_programs,
     "certificates": certificates.Certificates,
