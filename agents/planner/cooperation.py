@@ -56,8 +56,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.robots.conventions import N_OUTPUTS, Array
 
-OWN: Final = "own"  # values of planner.cost
-TEAM: Final = "team"
+TEAM: Final = "team"  # of planner.cost
 _TOLERANCE: Final = 1e-6  # of the eigenvalues
 _BY_SIZE: Final = -1.0  # value of planner.damping
 _FREE: Final = {"usual": 3}  # robots whose plans converge undamped, by planner.preset
@@ -69,11 +68,6 @@ def is_cooperative(config: Config) -> bool:
     planner = config.planner
     several = config.team.robots > 1
     return several and planner.cost == TEAM and find_kind(planner.kind).needs_peers
-
-
-def cost_of(config: Config) -> str:
-    """Whose cost each agent minimises: "own" or "team"."""
-    return TEAM if is_cooperative(config) else OWN
 
 
 def brings_forward(config: Config) -> bool:
