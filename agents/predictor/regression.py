@@ -85,7 +85,7 @@ def solve_pinv(regression: Regression, layout: Layout) -> Array:
     """
     x = np.zeros((layout.agents, layout.agents * layout.width, layout.rows))
     for members in set(layout.members):  # solved once for all agents with the same columns
-        agents = [i for i in range(layout.agents) if layout.members[i] == members]
+        agents = np.array([i for i, of in enumerate(layout.members) if of == members])
         rows = _columns_of(members, layout)
         b = regression.zy[np.ix_(rows, agents)].reshape(len(rows), -1)
         solution = _solve_least_norm(regression.zz[np.ix_(rows, rows)], b)

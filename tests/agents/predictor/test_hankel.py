@@ -20,10 +20,10 @@ def test_hankel_is_equation_2_and_split_is_equation_4() -> None:
     u, y = np.arange(12.0).reshape(6, 2), np.arange(6.0)[:, None]
     expected = [[0, 2, 4], [1, 3, 5], [2, 4, 6], [3, 5, 7], [4, 6, 8], [5, 7, 9]]
     np.testing.assert_array_equal(hankel(u[:5], 3), expected)
-    parts = split([u], [y], T_ini=2, N=3)
-    np.testing.assert_array_equal(np.vstack([parts.U_p, parts.U_f]), hankel(u, 5))
-    np.testing.assert_array_equal(np.vstack([parts.Y_p, parts.Y_f]), hankel(y, 5))
-    assert (parts.U_p.shape, parts.Y_f.shape) == ((4, 2), (3, 2))
+    U_p, Y_p, U_f, Y_f = split([u], [y], T_ini=2, N=3)
+    np.testing.assert_array_equal(np.vstack([U_p, U_f]), hankel(u, 5))
+    np.testing.assert_array_equal(np.vstack([Y_p, Y_f]), hankel(y, 5))
+    assert (U_p.shape, Y_f.shape) == ((4, 2), (3, 2))
 
 
 @given(SEED, st.integers(1, 4), st.integers(2, 6), st.integers(0, 20))

@@ -66,8 +66,8 @@ def test_every_kind_gives_the_true_response_of_a_linear_plant(
 def test_pinv_is_the_pseudo_inverse_of_equation_6(sizes: Sizes, noise: float) -> None:
     data = record(random_plant(sizes, 1), sizes, (160, 90), 2, noise)
     u, y = ([getattr(e, name).reshape(e.samples, -1) for e in data] for name in ("u", "y"))
-    parts = split(u, y, T_INI, N)
-    G = parts.Y_f @ np.linalg.pinv(np.vstack([parts.U_p, parts.Y_p, parts.U_f]))
+    U_p, Y_p, U_f, Y_f = split(u, y, T_INI, N)
+    G = Y_f @ np.linalg.pinv(np.vstack([U_p, Y_p, U_f]))
     past_u, past_y, future_u, _ = first_window(data[0], T_INI, N)
     written = G @ np.concatenate([past_u.ravel(), past_y.ravel(), future_u.ravel()])
     found = fit_plant(data, "pinv", T_INI, N).forecast(past_u, past_y, future_u)
