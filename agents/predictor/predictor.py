@@ -169,9 +169,10 @@ class Predictor:
         if agents != (n,):  # before the layout: a file may claim any number
             raise PredictorError("predictor", f"arrays of {agents} agents", f"{n}")
         layout = self.layout
+        expected = (self.phases, layout.agents, layout.agents, layout.rows, layout.width)
         if isinstance(parts, PeriodicFactors):
             parts.check(layout)
-        elif parts.shape != (expected := (self.phases, n, n, layout.rows, layout.width)):
+        elif parts.shape != expected:
             raise PredictorError("predictor.G", f"shape {parts.shape}", f"{expected}")
         for array in self.arrays().values():
             array.setflags(write=False)

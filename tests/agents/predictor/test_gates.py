@@ -354,17 +354,6 @@ def test_the_radius_tells_whether_the_iteration_of_plans_converges(
     assert growth == pytest.approx(iteration_radius(config, predictor), rel=0.03)
 
 
-def test_block_weight_reduces_the_radius(plant: Config, linear_team: Team) -> None:
-    """Noisy data of a strongly coupled team: without the weight the plans would diverge."""
-    data = [linear_team(2, coupling=4.0).episode(250, 5, noise=3.0)]
-    plain, weighted = (
-        fit_ridge(data, replace(PredictorMeta.of(plant), ridge=1e-3, block_weight=weight))
-        for weight in (1.0, 100.0)
-    )
-    assert iteration_radius(plant, plain) > 1.0
-    assert iteration_radius(plant, weighted) < 0.5
-
-
 # ---- effect of peers
 
 

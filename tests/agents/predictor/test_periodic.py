@@ -184,7 +184,7 @@ def test_blocks_rows_and_the_whole_of_G_are_the_same(fitted: Predictor) -> None:
     assert not table[[0, 2], [2, 0]].any()
 
 
-def test_what_is_saved_is_read(tmp_path: Path, fitted: Predictor) -> None:
+def test_what_is_saved_is_read_and_what_is_wrong_refused(tmp_path: Path, fitted: Predictor) -> None:
     digest = save(tmp_path / "periodic.npz", fitted)
     again, _ = load(tmp_path / "periodic.npz")
     assert isinstance(again.parts, PeriodicFactors)
@@ -192,10 +192,7 @@ def test_what_is_saved_is_read(tmp_path: Path, fitted: Predictor) -> None:
     np.testing.assert_array_equal(again.block(1, 2, 17), fitted.block(1, 2, 17))
     with pytest.raises(PredictorError, match=r"arrays of \(3,\) agents, expected 2"):
         Predictor(meta_of(2), fitted.parts)
-
-
-def test_data_too_few_to_be_divided_are_refused() -> None:
-    with pytest.raises(PredictorError, match="periodic predictor"):
+    with pytest.raises(PredictorError, match="data for the periodic predictor"):
         fit([Trotters(1, ()).episode(1, 16)], meta_of(1))
 
 
