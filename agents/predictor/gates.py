@@ -22,7 +22,6 @@ from quadriga.agents.planner.cooperation import cooperative_radius, is_cooperati
 from quadriga.agents.planner.qp import build_problem
 from quadriga.agents.predictor.episode import Episode
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta, as_tuples
-from quadriga.agents.predictor.regression import scaled_blocks
 from quadriga.agents.predictor.store import REMEDY, load, not_a_predictor
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError, PredictorFileError
@@ -379,15 +378,19 @@ def physical_height(config: Config, N: int) -> Array:
 
 def coupling_table(predictor: Predictor) -> Array:
     """Frobenius norms of the blocks G_ij of the scaled predictor, largest phase. Shape (n, n)."""
-    agents, layout = range(predictor.layout.agents), predictor.layout
-    norms = [
+    agents, (z_scale, y_scale) = range(predictor.layout.agents), predictor.layout.scales()
+    table: Array = np.array(
         [
-            [np.linalg.norm(scaled_blocks(predictor.block(i, j, phase), layout)) for j in agents]
+            [
+                max(
+                    np.linalg.norm(predictor.block(i, j, phase) * z_scale / y_scale[:, None])
+                    for phase in range(predictor.phases)
+                )
+                for j in agents
+            ]
             for i in agents
         ]
-        for phase in range(predictor.phases)
-    ]
-    table: Array = np.max(norms, axis=0)
+    )
     return table
 
 

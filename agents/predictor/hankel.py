@@ -51,11 +51,6 @@ def required_samples(m: int, T_ini: int, N: int, n: int) -> int:
     return (m + 1) * (T_ini + N + n) - 1
 
 
-def columns(signals: Iterable[Array], L: int) -> int:
-    """Number of columns of `mosaic(signals, L)`."""
-    return sum(max(len(signal) - L + 1, 0) for signal in signals)
-
-
 def gram(signals: Sequence[Array], L: int) -> Array:
     """H Hᵀ of H = mosaic(signals, L), without forming H. Shape (L q, L q) for signals (T, q).
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from quadriga.agents.predictor.episode import Episode, Layout, check_episodes
-from quadriga.agents.predictor.hankel import columns, gram
+from quadriga.agents.predictor.hankel import gram
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robots.conventions import Array
 
@@ -138,18 +138,12 @@ def to_physical(x: Array, layout: Layout) -> Array:
     return np.ascontiguousarray(blocks * y_scale[:, None] / z_scale)
 
 
-def scaled_blocks(G: Array, layout: Layout) -> Array:
-    """Blocks that map scaled signals to scaled signals, of the shape of `G`."""
-    z_scale, y_scale = layout.scales()
-    return G * z_scale / y_scale[:, None]
-
-
 def _sample_gram(episodes: Sequence[Episode], layout: Layout) -> tuple[Array, int]:
     """Gram matrix of windows of scaled [u of all agents; y of all], and how many windows."""
     check_episodes(episodes, layout)
     signals = [np.concatenate(each.scaled_deviations(layout), axis=1) for each in episodes]
     L = layout.T_ini + layout.N
-    return gram(signals, L), columns(signals, L)
+    return gram(signals, L), sum(each.samples - L + 1 for each in episodes)
 
 
 def _by_agent(index: Index, n: int, dim: int) -> Index:

@@ -8,18 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from quadriga.agents.gait import gait_phase, nominal_forces, scheduled_stance
 from quadriga.agents.predictor.episode import Y_SCALE, Episode, wrench_map
 from quadriga.agents.predictor.gates import coupling_table, held_out_error
-from quadriga.agents.predictor.periodic import (
-    PeriodicFactors,
-    held_samples,
-    polynomials,
-    spread_over_samples,
-)
+from quadriga.agents.predictor.periodic import PeriodicFactors, polynomials
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta, fit, fit_plant
 from quadriga.agents.predictor.store import load, predictor_sha256, save
 from quadriga.shared.config.sections import Config
@@ -261,28 +254,3 @@ def test_a_samples_angle_is_that_of_the_phase_it_begins_in() -> None:
         phase = gait_phase(1000 + 10 * k, meta.stand_ms, meta.stance_ms, 40)
         assert angle == pytest.approx(2 * np.pi * phase / 40)
     assert meta.period.angle_step == pytest.approx(2 * np.pi / 40)
-
-
-@settings(max_examples=20, deadline=None)
-@given(seed=st.integers(0, 2**31), hold=st.integers(1, 3))
-def test_single_samples_add_up_to_a_held_draw(seed: int, hold: int) -> None:
-    """A response that is smooth in its lag is found again from that to held draws."""
-    random, step, N = np.random.default_rng(seed), 2 * np.pi / 40, 25
-    decay = np.exp(-0.1 * np.arange(N))[:, None] * np.cos(0.2 * np.arange(N))[:, None]
-    h = random.normal(size=(6, 1, 4)) * decay
-    starts = np.array([k for k in range(40) if k % 20 + hold <= 20]) * step
-    F = polynomials(starts, 2)  # of draws that end in the half in which they begin
-    held = np.zeros((len(starts), N, 4))
-    for m in range(hold):
-        response = np.tensordot(polynomials(starts + m * step, 2), h, axes=1)
-        held[:, m:] += response[:, : N - m]
-    g = np.tensordot(np.linalg.pinv(F), held, axes=1)
-    found = spread_over_samples(g, hold, step)
-    assert np.linalg.norm(found - h) < 0.05 * np.linalg.norm(h)
-
-
-@given(hold=st.integers(1, 5), begin=st.integers(0, 4))
-def test_how_long_forces_are_held_is_found_in_the_data(hold: int, begin: int) -> None:
-    random, T = np.random.default_rng(hold), 120
-    u = np.repeat(random.normal(size=(T, 1, 12)), hold, axis=0)[hold - begin % hold :][:T]
-    assert held_samples([u]) == held_samples([u, 0.0 * u]) == hold

@@ -13,13 +13,7 @@ from hypothesis import strategies as st
 from quadriga.agents.predictor.episode import Episode, Layout, everyone
 from quadriga.agents.predictor.hankel import hankel, split
 from quadriga.agents.predictor.predictor import PredictorMeta, fit, fit_plant
-from quadriga.agents.predictor.regression import (
-    normal_equations,
-    reduce,
-    scaled_blocks,
-    solve_ridge,
-    to_physical,
-)
+from quadriga.agents.predictor.regression import normal_equations, reduce, solve_ridge, to_physical
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robots.conventions import Array
 from tests.agents.predictor.plants import Sizes, first_window, random_plant, record
@@ -92,8 +86,8 @@ def test_ridge_solves_its_normal_equations(agents: int, weight: float) -> None:
     """Gradient of the penalised least-squares cost, from the explicit windows, is zero."""
     layout, data = layout_of(agents), data_of(agents)
     x = solve_ridge(normal_equations(data, layout), layout, 1e-2, weight)
-    G = scaled_blocks(to_physical(x, layout), layout)
     z_scale, y_scale = layout.scales()
+    G = to_physical(x, layout) * z_scale / y_scale[:, None]
     z, y = data[0].windows(T_INI, N)
     Z = z / z_scale[:, None]
     for i in range(agents):
