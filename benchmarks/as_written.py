@@ -116,9 +116,10 @@ class DeepcQp:
         T_ini, N = config.T_ini, config.N
         layout = team_layout(n, T_ini, N)
         u, y = zip(*(episode.scaled_deviations(layout) for episode in episodes), strict=True)
-        data = split(u, y, T_ini, N)
-        U_p, U_f = _robots_first(data.U_p, n, N_FORCES), _robots_first(data.U_f, n, N_FORCES)
-        Y_p, Y_f = _robots_first(data.Y_p, n, N_OUTPUTS), _robots_first(data.Y_f, n, N_OUTPUTS)
+        U_p, Y_p, U_f, Y_f = (
+            _robots_first(part, n, size)
+            for part, size in zip(split(u, y, T_ini, N), (N_FORCES, N_OUTPUTS) * 2, strict=True)
+        )
         P = sparse.diags_array(
             np.concatenate(
                 [

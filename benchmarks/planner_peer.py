@@ -33,13 +33,13 @@ class CvxpyDeepc:
 
         layout = team_layout(1, config.T_ini, config.N)
         u, y = zip(*(episode.scaled_deviations(layout) for episode in episodes), strict=True)
-        data = split(u, y, config.T_ini, config.N)
-        N, rows = config.N, len(data.Y_p)
-        self._u_ini, self._y_ini = cp.Parameter(len(data.U_p)), cp.Parameter(rows)
+        U_p, Y_p, U_f, Y_f = split(u, y, config.T_ini, config.N)
+        N, rows = config.N, len(Y_p)
+        self._u_ini, self._y_ini = cp.Parameter(len(U_p)), cp.Parameter(rows)
         self._y_des, self._nominal = cp.Parameter(6 * N), cp.Parameter((4 * N, 3))
         self._box_low, self._box_high = cp.Parameter((4 * N, 3)), cp.Parameter((4 * N, 3))
         self._config = config
-        g, sigma = cp.Variable(data.U_p.shape[1]), cp.Variable(rows)
+        g, sigma = cp.Variable(U_p.shape[1]), cp.Variable(rows)
         self._u, y_f = cp.Variable((4 * N, 3)), cp.Variable(6 * N)
         flat = cp.reshape(self._u, 12 * N, order="C")
         force, c = self._u + self._nominal, config.mu / np.sqrt(2.0)
@@ -52,10 +52,10 @@ class CvxpyDeepc:
         self._problem = cp.Problem(
             cp.Minimize(cost),
             [
-                data.U_p @ g == self._u_ini,
-                data.Y_p @ g + sigma == self._y_ini,
-                data.U_f @ g == flat / U_SCALE,
-                data.Y_f @ g == cp.multiply(1.0 / np.tile(Y_SCALE, N), y_f),
+                U_p @ g == self._u_ini,
+                Y_p @ g + sigma == self._y_ini,
+                U_f @ g == flat / U_SCALE,
+                Y_f @ g == cp.multiply(1.0 / np.tile(Y_SCALE, N), y_f),
                 self._u >= self._box_low,
                 self._u <= self._box_high,
                 cp.abs(force[:, 0]) <= c * force[:, 2],

@@ -53,8 +53,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.robots.conventions import N_OUTPUTS, Array
 
-OWN: Final = "own"  # values of planner.cost
-TEAM: Final = "team"
+TEAM: Final = "team"  # of planner.cost
 _TOLERANCE: Final = 1e-6  # of the eigenvalues
 _BY_SIZE: Final = -1.0  # value of planner.damping
 
@@ -63,11 +62,6 @@ def is_cooperative(config: Config) -> bool:
     """Whether each agent of a team plans for all of it, knowing its peers' plans."""
     answers = config.team.robots > 1 and find_kind(config.planner.kind).needs_peers
     return answers and config.planner.cost == TEAM
-
-
-def cost_of(config: Config) -> str:
-    """Whose cost each agent minimises: "own" or "team"."""
-    return TEAM if is_cooperative(config) else OWN
 
 
 def brings_forward(config: Config) -> bool:

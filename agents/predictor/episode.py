@@ -36,7 +36,7 @@ class Layout:
         N: samples of the horizon.
         u_scale: of an agent's inputs, m numbers; fits see inputs divided by them.
         y_scale: of its outputs, p numbers.
-        members: of every agent: whose columns explain its outputs, in order, itself among them.
+        members: of every agent: whose columns explain its outputs, in order, its own among them.
         commanded: outputs whose base moves with a command that is known beforehand.
     """
 
@@ -165,9 +165,8 @@ def as_signal(name: str, values: ArrayLike) -> Array:
         PredictorError: no array of real, finite numbers up to 1e100 without a mask; other axes.
     """
     if np.ma.is_masked(values):
-        raise PredictorError(
-            name, "masked samples", "numbers", "split the data into episodes there"
-        )
+        cause = "split the data into episodes there"
+        raise PredictorError(name, "masked samples", "numbers", cause)
     if np.iscomplexobj(values):
         raise PredictorError(name, "complex numbers", "real numbers")
     try:
@@ -193,20 +192,15 @@ def check_episodes(episodes: Sequence[Episode], layout: Layout) -> None:
     """
     if not episodes:
         raise PredictorError("episodes", "none", "at least one", "did every walk end in a fall?")
-    expected = layout.agents, layout.inputs, layout.outputs
-    for episode in episodes:
-        got = *episode.u.shape[1:], episode.y.shape[2]
+    expected, least = (layout.agents, layout.inputs, layout.outputs), layout.T_ini + layout.N
+    for each in episodes:
+        got = *each.u.shape[1:], each.y.shape[2]
         if got != expected:
-            raise PredictorError(
-                "episode", f"(agents, inputs, outputs) = {got}", f"{expected}", "of another plant"
-            )
-        if episode.samples < layout.T_ini + layout.N:
-            raise PredictorError(
-                "episode",
-                f"{episode.samples} samples",
-                f"at least {layout.T_ini + layout.N}",
-                "cut short by a fall",
-            )
+            name = f"(agents, inputs, outputs) = {got}"
+            raise PredictorError("episode", name, f"{expected}", "of another plant")
+        if each.samples < least:
+            got_samples = f"{each.samples} samples"
+            raise PredictorError("episode", got_samples, f"at least {least}", "cut short by a fall")
 
 
 # ---- a team of robots
@@ -230,8 +224,8 @@ def team_layout(
 def output_base(config: Config, reference: Reference) -> Array:
     """The outputs that deviations are counted from while `reference` is in force. Shape (6,).
 
-    With the interface "feedforward" the low level already follows the reference, so the base is the
-    commanded outputs; with "force" the base is standing still at nominal height.
+    With the interface "feedforward" the low level follows the reference, so the base is the
+    commanded outputs; with "force" it is standing still at nominal height.
     """
     if config.planner.interface == "force":
         return np.array([config.robot.stand_height, 0.0, 0.0, 0.0, 0.0, 0.0])

@@ -6,30 +6,22 @@ The radius of the iteration of plans is one of the planner's own QPs.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import hashlib
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 from scipy import linalg
 from scipy.special import stdtrit
 
 from quadriga.agents.gait import distinct_steps, horizon_stance, phase_of, walking_steps
-from quadriga.agents.planner.cooperation import (
-    OWN,
-    TEAM,
-    cooperative_radius,
-    cost_of,
-    is_cooperative,
-    kept_share,
-)
-from quadriga.agents.planner.qp import PlannerProblem, build_problem
+from quadriga.agents.planner.cooperation import cooperative_radius, is_cooperative, kept_share
+from quadriga.agents.planner.qp import build_problem
 from quadriga.agents.predictor.episode import Episode
-from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
-from quadriga.agents.predictor.regression import scaled_blocks
+from quadriga.agents.predictor.predictor import Predictor, PredictorMeta, as_tuples
 from quadriga.agents.predictor.store import REMEDY, load, not_a_predictor
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError, PredictorFileError
@@ -42,7 +34,6 @@ GAIN_TIMES: Final = (0.1, 0.25)  # s after a step of force, when the height resp
 _GAIN_FORCE: Final = 10.0  # N, on the robot looked at
 _BLOCK: Final = 100  # windows: 1 s, longer than a window's errors are alike
 _TAIL: Final = 0.975  # of the two-sided interval
-_SAME: Final = 1e-6  # relative: other machines have other last digits, other costs differ by more
 # Fields of the meta that must be as configured, beside the controller's keys.
 _MATCHED: Final = (
     "robots", "robot", "stance_ms", "alternate_phase", "yokes", "interface", "N", "T_ini",
@@ -62,44 +53,21 @@ class GateReport:
     """Figures of a predictor, stored in its file; `check` holds them against their limits.
 
     Attributes:
-        windows: held-out windows predicted.
-        rmse: held-out error per output over the horizon, all robots [m, m/s, rad, rad/s].
-        rmse_persistence: the same for holding the last measured output.
-        error: scaled error of all outputs together over that of persistence.
+        error: scaled held-out error of all outputs together over that of persistence.
         gains: predicted over physical height response, per robot and time of `GAIN_TIMES`, of the
             worst phase.
         radius: spectral radius of the iteration of the agents' plans, the worst of all stance
             patterns and phases.
-        cost: that the agents minimise: "own", then the plans are best responses; "team".
-        cost_probes: tell the QPs that the radius was computed for.
-        harm: by output, (‖r − p‖² − ‖r‖²) / ‖r‖² on held-out data, where p is the part of a
-            prediction that is due to the peers' forces within the horizon, and r what is measured
-            less all other parts: how much p raises the squared error, negative if it helps. Empty
-            of a single robot, and of less than 1.5 s held out, which tell no interval.
+        planner: digest of the planner's keys that the radius is of, see `digest_planner`.
+        harm: by output, how much the predicted effect of the peers' forces raises the squared
+            error, see `peers_harm`.
     """
 
-    windows: int
-    rmse: Mapping[str, float]
-    rmse_persistence: Mapping[str, float]
     error: float
     gains: tuple[tuple[float, ...], ...]
     radius: float
-    cost: str = OWN
-    cost_probes: tuple[float, ...] = ()
+    planner: str = ""
     harm: Mapping[str, Bounds] = field(default_factory=dict)
-
-    @property
-    def iteration(self) -> str:
-        """What is iterated, in words."""
-        return "best-response" if self.cost == OWN else "cooperative"
-
-    def radius_limit(self, config: Config) -> float:
-        """What the radius must be below.
-
-        Cooperative plans converge wherever it is below 1, bounds or not. Of best responses none
-        knows where bounds are active, hence the margin `identification.max_radius`.
-        """
-        return 1.0 if self.cost == TEAM else config.identification.max_radius
 
     def check(self, config: Config) -> None:
         """Refuse the predictor if a figure is beyond its limit.
@@ -130,17 +98,18 @@ class GateReport:
                     )
         if not find_kind(config.planner.kind).needs_peers:
             return
-        if not self.radius < self.radius_limit(config):
-            remedy = "leave planner.damping at 0, which chooses it"
-            if self.cost == OWN:
+        if not self.radius < radius_limit(config):
+            name, remedy = "cooperative", "leave planner.damping at 0, which chooses it"
+            if not is_cooperative(config):
+                name = "best-response"
                 remedy = (
                     "damp them by planner.damping, plan with planner.cost = 'team', or, of a ridge "
                     "fit, raise identification.block_weight"
                 )
             raise PredictorError(
-                f"predictor: radius of the {self.iteration} map",
+                f"predictor: radius of the {name} map",
                 f"{self.radius:.3f}",
-                f"below {self.radius_limit(config):g}",
+                f"below {radius_limit(config):g}",
                 f"the agents' plans would diverge; {remedy}",
             )
         for output, harm in self.harm.items():
@@ -182,17 +151,21 @@ class Provenance:
         Raises:
             TypeError, KeyError: fields are missing.
         """
-        gates: dict[str, Any] = dict(body["gates"])
-        gates["gains"] = tuple(tuple(row) for row in gates["gains"])
-        gates["harm"] = {name: Bounds(*three) for name, three in gates.get("harm", {}).items()}
-        report = GateReport(**_fields_of(GateReport, gates))
-        return cls(**_fields_of(cls, {**body, "gates": report}))
+        given = body["gates"]
+        names = {each.name for each in fields(GateReport)} & given.keys()
+        known = {name: as_tuples(given[name]) for name in names}
+        known["harm"] = {name: Bounds(*three) for name, three in given.get("harm", {}).items()}
+        whole = {name: as_tuples(value) for name, value in body.items()}
+        return cls(**whole | {"gates": GateReport(**known)})
 
 
-def _fields_of(kind: type[Any], body: Mapping[str, Any]) -> dict[str, Any]:
-    """The entries that a dataclass has fields for, lists as tuples."""
-    names = {each.name for each in fields(kind)}
-    return {k: tuple(v) if isinstance(v, list) else v for k, v in body.items() if k in names}
+def radius_limit(config: Config) -> float:
+    """What the radius of the iteration of plans must be below.
+
+    Cooperative plans converge wherever it is below 1, bounds or not. Of best responses none knows
+    where bounds are active, hence the margin `identification.max_radius`.
+    """
+    return 1.0 if is_cooperative(config) else config.identification.max_radius
 
 
 # ---- files
@@ -214,8 +187,7 @@ def read(path: Path) -> tuple[Predictor, Provenance]:
 def load_checked(path: Path, config: Config) -> tuple[Predictor, Provenance]:
     """Read a predictor and refuse any that is not for this team or has not passed its gates.
 
-    The figures are compared with the limits of `config`. If the agents respond to each other's
-    plans, and their QPs are not those that the stored radius is of, it is computed again.
+    The figures are compared with the limits of `config`, see `gates_in_force`.
 
     Raises:
         PredictorFileError: no such file, not a predictor, corrupt, fitted for another team, gait,
@@ -250,14 +222,20 @@ def check_fitted_for(config: Config, path: Path, predictor: Predictor) -> None:
 
 
 def gates_in_force(gates: GateReport, config: Config, predictor: Predictor) -> GateReport:
-    """The figures that are stored with a predictor, with the radius of the QPs of `config`."""
-    if not find_kind(config.planner.kind).needs_peers:
+    """The figures that are stored with a predictor, with the radius of the plans of `config`.
+
+    It is computed again only if the agents respond to each other's plans, and any key of their
+    planner is another one than when it was stored.
+    """
+    digest = digest_planner(config)
+    if digest == gates.planner or not find_kind(config.planner.kind).needs_peers:
         return gates
-    probes = probe_costs(config, predictor)
-    if are_same_costs(probes, gates.cost_probes):
-        return gates
-    radius = iteration_radius(config, predictor)
-    return replace(gates, radius=radius, cost=cost_of(config), cost_probes=probes)
+    return replace(gates, radius=iteration_radius(config, predictor), planner=digest)
+
+
+def digest_planner(config: Config) -> str:
+    """Digest of all keys of the planner; 16 hexadecimal digits."""
+    return hashlib.sha256(repr(config.planner).encode()).hexdigest()[:16]
 
 
 def run_gates(config: Config, predictor: Predictor, held_out: Sequence[Episode]) -> GateReport:
@@ -266,16 +244,11 @@ def run_gates(config: Config, predictor: Predictor, held_out: Sequence[Episode])
     Raises:
         PredictorError: no held-out episode is long enough.
     """
-    windows, rmse, persistence, error = held_out_error(predictor, held_out)
     return GateReport(
-        windows=windows,
-        rmse=dict(zip(OUTPUTS, rmse, strict=True)),
-        rmse_persistence=dict(zip(OUTPUTS, persistence, strict=True)),
-        error=error,
+        error=held_out_error(predictor, held_out)[-1],
         gains=tuple(tuple(row) for row in height_gains(config, predictor).tolist()),
         radius=iteration_radius(config, predictor),
-        cost=cost_of(config),
-        cost_probes=probe_costs(config, predictor),
+        planner=digest_planner(config),
         harm=peers_harm(predictor, held_out),
     )
 
@@ -283,28 +256,27 @@ def run_gates(config: Config, predictor: Predictor, held_out: Sequence[Episode])
 # ---- held-out error
 
 
-def squared_errors(predictor: Predictor, held_out: Sequence[Episode]) -> tuple[int, Array, Array]:
-    """Mean squared errors of the windows of all held-out episodes and agents.
+def held_out_error(predictor: Predictor, held_out: Sequence[Episode]) -> tuple[Array, Array, float]:
+    """Errors of the windows of all held-out episodes and agents, of any plant.
 
     Persistence holds the last measured output y, not its deviation.
 
     Returns:
-        The number of windows; the errors of the predictor and of persistence, by sample of the
-        horizon and output, shape (N, p) each.
+        RMSE of the predictor and of persistence, by sample of the horizon and output, (N, p) each;
+        the ratio of all of them, scaled: below 1 the predictor is of use.
 
     Raises:
         PredictorError: no held-out episode is long enough for a window.
     """
     layout = predictor.layout
     T_ini, N, n, p = layout.T_ini, layout.N, layout.agents, layout.outputs
-    squares, naive, count = np.zeros((N, p)), np.zeros((N, p)), 0
-    for episode, phases, z, dy in _windows(predictor, held_out):
-        windows = len(phases)
-        error = _predict(predictor, phases, z) - dy
-        squares += (error.reshape(n, N, p, windows) ** 2).sum(axis=(0, 3))
+    squares, count = np.zeros((2, N, p)), 0  # of the predictor and of persistence
+    for episode, error, _ in _predict_windows(predictor, held_out):
+        windows = error.shape[2]
         future = sliding_window_view(episode.y[T_ini:], N, axis=0)  # (C, n, p, N)
         last = episode.y[T_ini - 1 : T_ini - 1 + windows, ..., None]
-        naive += ((future - last) ** 2).sum(axis=(0, 1)).T
+        squares[0] += (error.reshape(n, N, p, windows) ** 2).sum(axis=(0, 3))
+        squares[1] += ((future - last) ** 2).sum(axis=(0, 1)).T
         count += windows
     if count == 0:
         raise PredictorError(
@@ -313,43 +285,37 @@ def squared_errors(predictor: Predictor, held_out: Sequence[Episode]) -> tuple[i
             f"at least {T_ini + N} samples",
             "did every held-out walk end in a fall?",
         )
-    return count, squares / (count * n), naive / (count * n)
+    rmse, persistence = np.sqrt(squares / (count * n))
+    ours, theirs = (np.linalg.norm(each / np.array(layout.y_scale)) for each in (rmse, persistence))
+    return rmse, persistence, float(ours / theirs)
 
 
-def held_out_error(
-    predictor: Predictor, held_out: Sequence[Episode]
-) -> tuple[int, list[float], list[float], float]:
-    """Number of windows, RMSE per output, RMSE of persistence, and the ratio of scaled errors.
+def _predict_windows(
+    predictor: Predictor, episodes: Sequence[Episode]
+) -> Iterator[tuple[Episode, Array, Array]]:
+    """Predict every window of the episodes that are long enough by the G of its phase.
 
-    Of any plant: below a ratio of 1 the predictor is of use.
+    Yields:
+        The episode; by window, predicted less measured output deviations, and the part of the
+        prediction that is due to the peers' inputs of the horizon, (n, p N, C) each.
     """
-    count, squares, naive = squared_errors(predictor, held_out)
-    rmse, persistence = np.sqrt(squares.mean(axis=0)), np.sqrt(naive.mean(axis=0))
-    y_scale = np.array(predictor.layout.y_scale)
-    ratio = np.linalg.norm(rmse / y_scale) / np.linalg.norm(persistence / y_scale)
-    return count, rmse.tolist(), persistence.tolist(), float(ratio)
-
-
-def _windows(
-    predictor: Predictor, episodes: Iterable[Episode]
-) -> Iterable[tuple[Episode, NDArray[np.int64], Array, Array]]:
-    """Episodes that are long enough, with each window's phase at the end of its past, z and y."""
     layout, period = predictor.layout, predictor.meta.period
+    agents = range(layout.agents)
     for episode in episodes:
-        if episode.samples >= layout.T_ini + layout.N:
-            z, dy = episode.windows(layout.T_ini, layout.N)
-            ends = layout.T_ini - 1 + np.arange(z.shape[2])
-            since = episode.first_tick + period.sample * ends - period.begin
-            yield episode, since % period.ticks * predictor.phases // period.ticks, z, dy
-
-
-def _predict(predictor: Predictor, phases: NDArray[np.int64], z: Array) -> Array:
-    """Predicted output deviations of windows, each by the G of its phase. Shape (n, p N, C)."""
-    y = np.empty((len(z), predictor.layout.rows, z.shape[2]))
-    for phase in np.unique(phases):
-        now = phases == phase
-        y[:, :, now] = predictor.predict(z[:, :, now], int(phase))
-    return y
+        if episode.samples < layout.T_ini + layout.N:
+            continue
+        z, dy = episode.windows(layout.T_ini, layout.N)
+        ends = layout.T_ini - 1 + np.arange(z.shape[2])
+        since = episode.first_tick + period.sample * ends - period.begin
+        phases = since % period.ticks * predictor.phases // period.ticks
+        error, peers = -dy, np.zeros_like(dy)
+        for phase in np.unique(phases).tolist():
+            now = phases == phase
+            error[:, :, now] += predictor.predict(z[:, :, now], phase)
+            for i, j in ((i, j) for i in agents for j in agents if i != j):
+                u = z[j, layout.past :][:, now]
+                peers[i][:, now] += predictor.future_block(i, j, phase) @ u
+        yield episode, error, peers
 
 
 # ---- height gain and coupling
@@ -412,15 +378,19 @@ def physical_height(config: Config, N: int) -> Array:
 
 def coupling_table(predictor: Predictor) -> Array:
     """Frobenius norms of the blocks G_ij of the scaled predictor, largest phase. Shape (n, n)."""
-    agents, layout = range(predictor.layout.agents), predictor.layout
-    norms = [
+    agents, (z_scale, y_scale) = range(predictor.layout.agents), predictor.layout.scales()
+    table: Array = np.array(
         [
-            [np.linalg.norm(scaled_blocks(predictor.block(i, j, phase), layout)) for j in agents]
+            [
+                max(
+                    np.linalg.norm(predictor.block(i, j, phase) * z_scale / y_scale[:, None])
+                    for phase in range(predictor.phases)
+                )
+                for j in agents
+            ]
             for i in agents
         ]
-        for phase in range(predictor.phases)
-    ]
-    table: Array = np.max(norms, axis=0)
+    )
     return table
 
 
@@ -430,20 +400,20 @@ def coupling_table(predictor: Predictor) -> Array:
 def peers_harm(predictor: Predictor, held_out: Sequence[Episode]) -> dict[str, Bounds]:
     """How much the predicted effect of the peers' forces raises the squared error, by output.
 
-    The forces of the data are random and independent between robots, so that no walk is needed
-    twice, and data of real robots will do. Sums over blocks of windows; the interval is that of the
-    delta method for a ratio of such sums, with Student's t (Cochran, Sampling Techniques, 3rd ed.,
-    section 6.3).
+    That is (‖r − p‖² − ‖r‖²) / ‖r‖², where p is the part of a prediction that is due to the peers'
+    forces within the horizon, and r what is measured less all other parts; negative if p helps.
+    Forces in the data are random and independent between robots, so that no walk is needed twice,
+    and data of real robots will do. Sums over blocks of windows; the interval is that of the delta
+    method for a ratio of such sums, with Student's t (Cochran, Sampling Techniques, 3rd ed.,
+    section 6.3). Empty of a single robot, and of less than 1.5 s held out, which tell no interval.
     """
     layout, blocks = predictor.layout, []
     if layout.agents == 1:
         return {}
-    for _, phases, z, dy in _windows(predictor, held_out):
-        peers = _peers_part(predictor, phases, z[:, layout.past :])
-        error = dy - _predict(predictor, phases, z)
-        squares = np.array([error**2, (error + peers) ** 2])
+    for _, error, peers in _predict_windows(predictor, held_out):
+        squares = np.array([error**2, (error - peers) ** 2])
         by_window = squares.reshape(2, layout.agents, layout.N, layout.outputs, -1).sum(axis=(1, 2))
-        count = max(1, round(len(phases) / _BLOCK))
+        count = max(1, round(error.shape[2] / _BLOCK))
         blocks += [part.sum(axis=2) for part in np.array_split(by_window, count, axis=2)]
     F = len(blocks)
     if F < 2:
@@ -457,16 +427,6 @@ def peers_harm(predictor: Predictor, held_out: Sequence[Episode]) -> dict[str, B
     return {name: Bounds(*row) for name, row in zip(OUTPUTS, rows, strict=True)}
 
 
-def _peers_part(predictor: Predictor, phases: NDArray[np.int64], u: Array) -> Array:
-    """Part of predictions due to the peers' forces u of the horizon, (n, 12 N, C). (n, 6 N, C)."""
-    agents, peers = range(len(u)), np.zeros((len(u), predictor.layout.rows, u.shape[2]))
-    for phase in np.unique(phases):
-        now = phases == phase
-        for i, j in ((i, j) for i in agents for j in agents if i != j):
-            peers[i][:, now] += predictor.future_block(i, j, int(phase)) @ u[j][:, now]
-    return peers
-
-
 # ---- whether the iteration of the agents' plans converges
 
 
@@ -477,8 +437,16 @@ def best_response_map(config: Config, predictor: Predictor, step: int) -> Array:
     `step`, with the G of its phase and the damping d. H_ii is that of the QP that is solved.
     Shape (s, s), s being the number of stance forces of the team (150 per robot at N = 25).
     """
-    phase, problems = phase_of(config, step, predictor.phases), _problems(config, predictor, step)
-    rows = []
+    phase, rows = phase_of(config, step, predictor.phases), []
+    problems = [
+        build_problem(
+            config.planner,
+            config.robot.weight,
+            predictor.future_block(i, i, phase),
+            horizon_stance(config, i, step),
+        )
+        for i in range(predictor.layout.agents)
+    ]
     for i, own in enumerate(problems):
         coupling = [
             np.zeros_like(own.H)
@@ -505,40 +473,3 @@ def iteration_radius(config: Config, predictor: Predictor) -> float:
         float(np.abs(linalg.eigvals(best_response_map(config, predictor, step))).max())
         for step in distinct_steps(config, predictor.phases)
     )
-
-
-def probe_costs(config: Config, predictor: Predictor) -> tuple[float, ...]:
-    """Numbers that tell the QPs that a radius belongs to: Σ pᵀ H p and Σ pᵀ G_uᵀ Q̄ q of each step.
-
-    p and q are fixed, so that any key that changes a cost changes them, whatever it is called.
-    Two numbers for each distinct planning step, of all agents' own QPs, after one that tells
-    cooperative plans from best responses and has their damping; () for a single robot.
-    """
-    if predictor.layout.agents == 1:
-        return ()
-    kept = kept_share(config)
-    probes = [-kept] if kept else []
-    if is_cooperative(config):
-        probes = [-1.0 - max(0.0, config.planner.damping)]
-    for step in distinct_steps(config, predictor.phases):
-        random, hessian, gradient = np.random.default_rng(0), 0.0, 0.0
-        for problem in _problems(config, predictor, step):
-            p, q = (random.uniform(0.5, 1.5, size) for size in problem.gradient.shape)
-            hessian += float(p @ problem.H @ p)
-            gradient += float(p @ problem.gradient @ q)
-        probes += [hessian, gradient]
-    return tuple(probes)
-
-
-def are_same_costs(probes: tuple[float, ...], others: tuple[float, ...]) -> bool:
-    """Whether two results of `probe_costs` are of the same QPs."""
-    return len(probes) == len(others) and np.allclose(probes, others, rtol=_SAME, atol=0.0)
-
-
-def _problems(config: Config, predictor: Predictor, step: int) -> list[PlannerProblem]:
-    """Each agent's QP at a planning step, as the planner builds it."""
-    phase, problems = phase_of(config, step, predictor.phases), []
-    for i in range(predictor.layout.agents):
-        G_u, stance = predictor.future_block(i, i, phase), horizon_stance(config, i, step)
-        problems.append(build_problem(config.planner, config.robot.weight, G_u, stance))
-    return problems

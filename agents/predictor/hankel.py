@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -33,30 +32,23 @@ def mosaic(signals: Iterable[Array], L: int) -> Array:
     return np.concatenate([hankel(signal, L) for signal in signals if len(signal) >= L], axis=1)
 
 
-class Split(NamedTuple):
-    """Past and future of a data set (eq. 4): (m T_ini, M), (p T_ini, M), (m N, M), (p N, M)."""
+def split(u: Sequence[Array], y: Sequence[Array], T_ini: int, N: int) -> tuple[Array, ...]:
+    """U_p, Y_p, U_f and Y_f of the Hankel matrices of several episodes (eq. 4).
 
-    U_p: Array
-    Y_p: Array
-    U_f: Array
-    Y_f: Array
-
-
-def split(u: Sequence[Array], y: Sequence[Array], T_ini: int, N: int) -> Split:
-    """Split the Hankel matrices of inputs (T, m) and outputs (T, p) of several episodes (eq. 4)."""
+    Args:
+        u: inputs of each episode, (T, m).
+        y: outputs of each, (T, p).
+        T_ini: samples of the past.
+        N: samples of the future.
+    """
     U, Y = mosaic(u, T_ini + N), mosaic(y, T_ini + N)
     m, p = u[0].shape[1], y[0].shape[1]
-    return Split(U[: m * T_ini], Y[: p * T_ini], U[m * T_ini :], Y[p * T_ini :])
+    return U[: m * T_ini], Y[: p * T_ini], U[m * T_ini :], Y[p * T_ini :]
 
 
 def required_samples(m: int, T_ini: int, N: int, n: int) -> int:
     """Least T for a sufficiently rich Hankel matrix, (m+1)(T_ini+N+n)−1; n is the order."""
     return (m + 1) * (T_ini + N + n) - 1
-
-
-def columns(signals: Iterable[Array], L: int) -> int:
-    """Number of columns of `mosaic(signals, L)`."""
-    return sum(max(len(signal) - L + 1, 0) for signal in signals)
 
 
 def gram(signals: Sequence[Array], L: int) -> Array:
@@ -75,14 +67,12 @@ def gram(signals: Sequence[Array], L: int) -> Array:
     for a in range(L - 1):
         row = S[(a + 1) * q : (a + 2) * q, (a + 1) * q :]
         row[:] = S[a * q : (a + 1) * q, a * q : (L - 1) * q]
-        row += _products([w[a + M :] for w, M in episodes])
-        row -= _products([w[a : L - 1] for w, _ in episodes])
+        for sign, windows in (
+            (1.0, [w[a + M :] for w, M in episodes]),
+            (-1.0, [w[a : L - 1] for w, _ in episodes]),
+        ):
+            first = np.stack([window[0] for window in windows])
+            row += sign * (first.T @ np.stack([window.ravel() for window in windows]))
     for a in range(L - 1):
         S[(a + 1) * q :, a * q : (a + 1) * q] = S[a * q : (a + 1) * q, (a + 1) * q :].T
     return S
-
-
-def _products(windows: Sequence[Array]) -> Array:
-    """Σ w_0 [w_0 w_1 …]ᵀ over windows of equal length."""
-    stacked = np.stack([window.ravel() for window in windows])
-    return np.stack([window[0] for window in windows]).T @ stacked

@@ -8,19 +8,17 @@ nominal inputs (`fit_free`).
 
 from __future__ import annotations
 
-import operator
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from itertools import product
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 from scipy import linalg
 
-from quadriga.agents.predictor.episode import Episode, Layout
+from quadriga.agents.predictor.episode import Episode, Layout, check_episodes
 from quadriga.agents.predictor.regression import Index, factorise
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robots.conventions import Array
@@ -147,10 +145,6 @@ class PeriodicFactors:
     free: Array
     wrench: Array
 
-    def __post_init__(self) -> None:
-        for array in self.arrays().values():
-            array.setflags(write=False)
-
     def arrays(self) -> Mapping[str, Array]:
         """The factors, by name."""
         return {name: getattr(self, name) for name in FACTORS}
@@ -171,10 +165,6 @@ class PeriodicFactors:
             shape = getattr(self, name).shape
             if shape[1:] != end:
                 raise PredictorError(f"predictor.{name}", f"shape {shape}", f"(…, {end})")
-
-    def couples(self, i: int, j: int) -> bool:
-        """Whether anything that agent j does has an effect on agent i."""
-        return bool(self.response[:, :, j, :, i].any() or self.free[:, i, j].any())
 
     def block(self, i: int, j: int, phase: int, phases: int) -> Array:
         """G_ij of one of `phases` equal parts of the period. Shape (p N, (m + p) T_ini + m N)."""
@@ -219,6 +209,7 @@ def fit_periodic(
     Raises:
         PredictorError: too little data, or a singular problem.
     """
+    check_episodes(episodes, layout)
     hold = held_samples([episode.deviations()[0] for episode in episodes])
     walks = [_see(episode, layout, period, wrench, hold) for episode in episodes]
     h = estimate_response(walks, hold, layout, period.angle_step) if response is None else response
@@ -313,9 +304,14 @@ class _Sums(NamedTuple):
     third: Array
     rows: int
 
-
-def _each(operation: Callable[[Any, Any], Any], one: _Sums, other: _Sums) -> _Sums:
-    return _Sums(*map(operation, one, other))
+    def plus(self, other: _Sums, sign: float = 1.0) -> _Sums:
+        """Of the rows of both; with −1.0 without those of the other."""
+        return _Sums(
+            self.zz + sign * other.zz,
+            self.zy + sign * other.zy,
+            self.third + sign * other.third,
+            self.rows + int(sign) * other.rows,
+        )
 
 
 # ---- responses: one regression for each lag
@@ -346,10 +342,9 @@ def estimate_response(
             "enough to be divided",
             "collect more: identification.seconds",
         )
-    total = reduce(lambda one, other: _each(operator.add, one, other), folds)
-    estimate = _solve_lags(total, n, hold)
-    without = np.stack([_solve_lags(_each(operator.sub, total, fold), n, hold) for fold in folds])
-    response, _ = shrink(estimate, without)
+    total = reduce(_Sums.plus, folds)
+    without = np.stack([_solve_lags(total.plus(fold, -1.0), n, hold) for fold in folds])
+    response = shrink(_solve_lags(total, n, hold), without)
     for i, members in enumerate(layout.members):
         response[:, :, [j for j in range(n) if j not in members], :, i] = 0.0
     return spread_over_samples(response, hold, angle_step)
@@ -363,7 +358,7 @@ def _sum_folds(walks: Sequence[_Walk], N: int, hold: int) -> list[_Sums]:
     seen = 0
     for walk, at in _chunks(walks, _PAST, N, size, starts=True):
         fold, part = min(FOLDS - 1, seen * FOLDS // total), _sum_response_rows(walk, at, N, hold)
-        folds[fold] = _each(operator.add, folds[fold], part) if fold in folds else part
+        folds[fold] = folds[fold].plus(part) if fold in folds else part
         seen += len(at)
     return [*folds.values()]
 
@@ -434,7 +429,7 @@ def spread_over_samples(g: Array, hold: int, angle_step: float) -> Array:
 # folds scatter tells how much of a response's square is noise.
 
 
-def shrink(estimate: Array, without: Array) -> tuple[Array, NDArray[np.bool_]]:
+def shrink(estimate: Array, without: Array) -> Array:
     """Draw groups of a response towards zero by what of them is noise.
 
     A group is one polynomial of the phase, at all lags, of one output's response to one component
@@ -447,34 +442,26 @@ def shrink(estimate: Array, without: Array) -> tuple[Array, NDArray[np.bool_]]:
         without: from all folds but one, (F, k, N, n, w, n, p).
 
     Returns:
-        The response, of the shape of `estimate`, and whether each output of agent i responds to
-        agent j at all, (n responding, n pushing, p).
+        The response, of the shape of `estimate`.
     """
-    F = len(without)
+    F, n = len(without), estimate.shape[2]
     deviation = without - without.mean(axis=0)
     variance = (F - 1) / F * (deviation**2).sum(axis=0)
     square, noise = (x.sum(axis=1, keepdims=True) for x in (estimate**2, variance))
     tiny = np.finfo(float).tiny
-    factor = np.clip(1.0 - noise / np.maximum(square, tiny), 0.0, 1.0)
-    response = estimate * factor
-    weight = 1.0 / np.sqrt(np.maximum(noise, tiny))
-    kept = _is_significant((F * estimate - (F - 1) * without) * weight)
-    size = np.einsum("kljwio,kljwio->jio", response, response)
-    own = np.einsum("iio->io", size)
-    kept &= size.transpose(1, 0, 2) > _SMALLEST**2 * own[:, None]
-    kept[np.arange(len(kept)), np.arange(len(kept))] = True
-    return response * kept.transpose(1, 0, 2)[None, None, :, None], kept
-
-
-def _is_significant(folds: Array) -> NDArray[np.bool_]:
-    """Whether an effect is real, from each fold's own estimate over its error. (n, n, p)."""
-    F, n = len(folds), folds.shape[3]
+    response: Array = estimate * np.clip(1.0 - noise / np.maximum(square, tiny), 0.0, 1.0)
+    # Each fold's own estimate over its error, (F, pushing, responding, output, all else).
+    folds = (F * estimate - (F - 1) * without) * (1.0 / np.sqrt(np.maximum(noise, tiny)))
     flat = np.moveaxis(folds, (3, 5, 6), (1, 2, 3)).reshape(F, n, n, folds.shape[-1], -1)
     first, second = np.triu_indices(F, 1)
-    pairs = (flat[first] * flat[second]).sum(axis=-1)  # (pairs, pushing, responding, output)
+    pairs = (flat[first] * flat[second]).sum(axis=-1)
     error = np.sqrt((pairs**2).mean(axis=0) / len(pairs))
-    significant: NDArray[np.bool_] = pairs.mean(axis=0) > _SIGNIFICANT * error
-    return significant.transpose(1, 0, 2)
+    size = np.einsum("kljwio,kljwio->jio", response, response)
+    own = np.einsum("iio->io", size)
+    kept = (pairs.mean(axis=0) > _SIGNIFICANT * error) & (size > _SMALLEST**2 * own)
+    kept[range(n), range(n)] = True
+    response *= kept[None, None, :, None]
+    return response
 
 
 # ---- what follows from the past
@@ -486,7 +473,7 @@ def _is_significant(folds: Array) -> NDArray[np.bool_]:
 def fit_free(walks: Sequence[_Walk], h: Array, layout: Layout) -> Array:
     """The map as harmonics. Shape (2 FREE_ORDER + 1, n responding, n, p N, (w + p) T_ini)."""
     train, rest = _sum_free_parts(walks, h, layout.T_ini)
-    both = _each(operator.add, train, rest)
+    both = train.plus(rest)
     waves, (_, N, n, w, _, p) = 2 * FREE_ORDER + 1, h.shape
     width = (w + p) * layout.T_ini
     wave, agent, _ = np.indices((waves, n, width)).reshape(3, -1)
@@ -525,7 +512,7 @@ def _sum_free_parts(walks: Sequence[_Walk], h: Array, T_ini: int) -> tuple[_Sums
         yy = (y**2).sum(axis=0).reshape(N, n, p).sum(axis=0)
         here = _Sums(z.T @ z, (z.T @ y).reshape(K, N, n, p), yy, len(at))
         part = int(seen >= (1.0 - _HELD_OUT) * total)
-        parts[part] = _each(operator.add, parts[part], here)
+        parts[part] = parts[part].plus(here)
         seen += len(at)
     return parts[0], parts[1]
 

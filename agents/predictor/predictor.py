@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
-from pathlib import Path
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -20,7 +19,6 @@ from quadriga.agents.predictor.episode import (
     team_layout,
     wrench_map,
 )
-from quadriga.agents.predictor.measured_response import fit_measured_response, read_pulse_responses
 from quadriga.agents.predictor.periodic import Period, PeriodicFactors, fit_periodic
 from quadriga.agents.predictor.regression import (
     check_excitation,
@@ -110,10 +108,7 @@ class PredictorMeta:
         """
         changes: dict[str, Any] = {"controller": tuple(sorted(body["controller"].items()))}
         if "plant" in body:
-            given = body["plant"]
-            members = tuple(tuple(agents) for agents in given["members"])
-            scales = {name: tuple(given[name]) for name in ("u_scale", "y_scale", "commanded")}
-            changes["plant"] = Layout(**given | scales | {"members": members})
+            changes["plant"] = Layout(**{k: as_tuples(v) for k, v in body["plant"].items()})
         return cls(**body | changes)
 
     @property
@@ -145,6 +140,11 @@ class PredictorMeta:
         return self.layout.past
 
 
+def as_tuples(value: Any) -> Any:
+    """A value of JSON with tuples for its lists, however deep they are."""
+    return tuple(map(as_tuples, value)) if isinstance(value, list) else value
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Predictor:
     """y^i = Σ_j G_ij [u_ini^j; y_ini^j; u^j] in deviations and physical units (eq. 10).
@@ -155,7 +155,6 @@ class Predictor:
             columns are time-major (sample 0's inputs, sample 1's, …), of robots N and m, m/s, rad,
             rad/s. Or the factors of a periodic one, of which blocks are expanded when they are
             asked for.
-        layout: its sizes and scales, those of the meta.
 
     Raises:
         PredictorError: arrays of other shapes.
@@ -163,25 +162,25 @@ class Predictor:
 
     meta: PredictorMeta
     parts: Array | PeriodicFactors
-    layout: Layout = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        parts = self.parts
-        agents = (
-            parts.response.shape[2:3] if isinstance(parts, PeriodicFactors) else parts.shape[1:2]
-        )
-        if agents != (self.meta.robots,):  # before the layout: a file may claim any number
-            raise PredictorError("predictor", f"arrays of {agents} agents", f"{self.meta.robots}")
-        layout = self.meta.layout
-        object.__setattr__(self, "layout", layout)
+        parts, n = self.parts, self.meta.robots
+        agents = (parts.free if isinstance(parts, PeriodicFactors) else parts).shape[1:2]
+        if agents != (n,):  # before the layout: a file may claim any number
+            raise PredictorError("predictor", f"arrays of {agents} agents", f"{n}")
+        layout = self.layout
+        expected = (self.phases, layout.agents, layout.agents, layout.rows, layout.width)
         if isinstance(parts, PeriodicFactors):
             parts.check(layout)
-            return
-        n = layout.agents
-        expected = (self.phases, n, n, layout.rows, layout.width)
-        if parts.shape != expected:
+        elif parts.shape != expected:
             raise PredictorError("predictor.G", f"shape {parts.shape}", f"{expected}")
-        parts.setflags(write=False)
+        for array in self.arrays().values():
+            array.setflags(write=False)
+
+    @property
+    def layout(self) -> Layout:
+        """Its sizes and scales, those of the meta."""
+        return self.meta.layout
 
     @property
     def phases(self) -> int:
@@ -207,14 +206,11 @@ class Predictor:
         """The columns of G_ij that multiply the future inputs. Shape (p N, m N)."""
         if isinstance(self.parts, PeriodicFactors):
             return self.parts.future_block(i, j, phase, self.phases)
-        block: Array = self.parts[phase, i, j, :, self.layout.past :]
-        return block
+        return self.block(i, j, phase)[:, self.layout.past :]
 
     def couples(self, i: int, j: int) -> bool:
         """Whether anything that agent j does has an effect on agent i."""
-        if isinstance(self.parts, PeriodicFactors):
-            return self.parts.couples(i, j)
-        return bool(self.parts[:, i, j].any())
+        return any(self.block(i, j, phase).any() for phase in range(self.phases))
 
     def arrays(self) -> Mapping[str, Array]:
         """What it is made of, by name: with the meta all that a file must hold."""
@@ -286,7 +282,12 @@ def check_sizes(config: Config, predictor: Predictor) -> None:
 # ---- fits
 
 
-def fit(episodes: Sequence[Episode], meta: PredictorMeta, wrench: Array | None = None) -> Predictor:
+def fit(
+    episodes: Sequence[Episode],
+    meta: PredictorMeta,
+    wrench: Array | None = None,
+    response: Array | None = None,
+) -> Predictor:
     """The fit that `meta.kind` names.
 
     - pinv: G = Y_f [U_p; Y_p; U_f]† (eq. 6).
@@ -294,36 +295,28 @@ def fit(episodes: Sequence[Episode], meta: PredictorMeta, wrench: Array | None =
       with M columns: effects that the data do not clearly show are not attributed to the peers.
       Without this weight the agents' best responses to each other's last plans diverge.
     - periodic: a function of the phase in which no input acts backwards, see `periodic`; of a team
-      that of the gait, with peers by their net wrench. Measured responses stand for fitted ones if
-      there is a file of them.
+      that of the gait, with peers by their net wrench.
 
     Args:
         episodes: of the plant.
         meta: what is fitted.
         wrench: of `periodic`, from an agent's inputs to what they act by, (w, m); None: of the
             robot.
+        response: of `periodic`, what stands for a fitted one, see `fit_periodic`.
 
     Raises:
         PredictorError: no data, too little, of another plant, or a singular problem.
-        PredictorFileError: the file of measured responses cannot be read, or is another team's.
     """
-    layout = meta.layout
+    layout, period = meta.layout, meta.period
     if meta.kind == "periodic":
-        check_episodes(episodes, layout)
         B = wrench_map(meta.robot) if wrench is None else wrench
-        response = None
-        if meta.response:
-            measured = read_pulse_responses(Path(meta.response))
-            response = fit_measured_response(measured, layout, meta.period, B)
-        factors = fit_periodic(episodes, layout, meta.period, B, response)
-        phases = max(1, meta.period.ticks // meta.period.sample)
-        return Predictor(replace(meta, phases=phases), factors)
-    regression = normal_equations(episodes, layout)
+        factors = fit_periodic(episodes, layout, period, B, response)
+        return Predictor(replace(meta, phases=max(1, period.ticks // period.sample)), factors)
+    regression, meta = normal_equations(episodes, layout), replace(meta, phases=1)
     if meta.kind == "pinv":
-        meta = replace(meta, phases=1, ridge=0.0, block_weight=1.0)
+        meta = replace(meta, ridge=0.0, block_weight=1.0)
         x = solve_pinv(regression, layout)
     else:
-        meta = replace(meta, phases=1)
         x = solve_ridge(regression, layout, meta.ridge, meta.block_weight)
     return Predictor(meta, to_physical(x, layout)[None])
 
@@ -378,11 +371,11 @@ def fit_plant(
     B = np.eye(m) if input_map is None else as_signal("input_map", input_map)[:, 0]
     if B.shape[1] != m:
         raise PredictorError("input_map", f"shape {B.shape}", f"(w, {m})")
-    check_episodes(episodes, Layout(n, m, p, T_ini, N, (1.0,) * m, (1.0,) * p, everyone(n)))
+    unscaled = Layout(n, m, p, T_ini, N, (1.0,) * m, (1.0,) * p, everyone(n))
+    check_episodes(episodes, unscaled)
     inputs, outputs = zip(*(episode.deviations() for episode in episodes), strict=True)
     _check_variation(inputs, outputs)
-    scales = _sizes(inputs), _sizes(outputs)
-    layout = Layout(n, m, p, T_ini, N, *scales, everyone(n))
+    layout = replace(unscaled, u_scale=_sizes(inputs), y_scale=_sizes(outputs))
     meta = PredictorMeta(n, N, T_ini, kind, period, ridge, block_weight, plant=layout)
     if kind == "pinv" or ridge == 0.0:
         scaled = [episode.scaled_deviations(layout)[0] for episode in episodes]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from quadriga.agents.predictor.episode import Episode, Layout, check_episodes
-from quadriga.agents.predictor.hankel import columns, gram
+from quadriga.agents.predictor.hankel import gram
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robots.conventions import Array
 
@@ -22,40 +22,28 @@ Index = NDArray[np.int64]
 _RANK_TOLERANCE: Final = 1e-12
 
 
-def hankel_rank(inputs: Sequence[Array], order: int) -> int:
-    """Rank of the Hankel matrix of `order` of the inputs of all episodes together.
-
-    They are persistently exciting of this order (definition 1) if it is m · order.
+def check_excitation(inputs: Sequence[Array], order: int) -> None:
+    """Refuse inputs from which the plant's response cannot be told.
 
     Args:
         inputs: per episode shape (T, m).
         order: block rows; for the fundamental lemma the horizon plus the plant's order.
-    """
-    S = gram(inputs, order)
-    floor = _RANK_TOLERANCE * max(float(np.linalg.norm(S)), np.finfo(float).tiny)
-    S.flat[:: len(S) + 1] -= floor
-    try:  # Cholesky shows 20 times faster that no eigenvalue is small
-        linalg.cholesky(S.T, lower=True, overwrite_a=True, check_finite=False)
-    except linalg.LinAlgError:
-        eigenvalues = linalg.eigvalsh(gram(inputs, order), overwrite_a=True, check_finite=False)
-        return int((eigenvalues > floor).sum())
-    return len(S)
-
-
-def check_excitation(inputs: Sequence[Array], order: int) -> None:
-    """Refuse inputs (T, m) from which the plant's response cannot be told.
 
     Raises:
-        PredictorError: together they are not persistently exciting of this order.
+        PredictorError: together they are not persistently exciting of this order: the rank of
+            their Hankel matrix is below m · order (definition 1).
     """
-    rank, full = hankel_rank(inputs, order), inputs[0].shape[1] * order
-    if rank < full:
+    S = gram(inputs, order)
+    S.flat[:: len(S) + 1] -= _RANK_TOLERANCE * float(np.linalg.norm(S))
+    try:
+        factorise(S.T)
+    except PredictorError:
         raise PredictorError(
             "inputs in the data",
-            f"a Hankel matrix of rank {rank}",
-            f"rank {full}: persistently exciting of order {order}",
+            f"a Hankel matrix of a rank below {len(S)}",
+            f"rank {len(S)}: persistently exciting of order {order}",
             "too little data, or an input that hardly varies: more noise, or shorter holds of it",
-        )
+        ) from None
 
 
 class Regression(NamedTuple):
@@ -92,16 +80,13 @@ def normal_equations(episodes: Sequence[Episode], layout: Layout) -> Regression:
 def solve_pinv(regression: Regression, layout: Layout) -> Array:
     """Y_f Z† = (Σ y zᵀ)(Σ z zᵀ)†, the solution of least norm where several are best (eq. 6).
 
-    Solved once for all agents whose regressions have the same columns.
-
     Returns:
         Scaled solutions, shape (n, n W, p N); zero in the rows of agents left out.
     """
-    n = layout.agents
-    x = np.zeros((n, n * layout.width, layout.rows))
-    for members in set(layout.members):
-        agents = np.array([i for i in range(n) if layout.members[i] == members])
-        rows = _past_first(layout, members)
+    x = np.zeros((layout.agents, layout.agents * layout.width, layout.rows))
+    for members in set(layout.members):  # solved once for all agents with the same columns
+        agents = np.array([i for i, of in enumerate(layout.members) if of == members])
+        rows = _columns_of(members, layout)
         b = regression.zy[np.ix_(rows, agents)].reshape(len(rows), -1)
         solution = _solve_least_norm(regression.zz[np.ix_(rows, rows)], b)
         x[np.ix_(agents, rows)] = solution.reshape(len(rows), len(agents), -1).transpose(1, 0, 2)
@@ -117,16 +102,13 @@ def solve_ridge(regression: Regression, layout: Layout, ridge: float, weight: fl
     Raises:
         PredictorError: a singular problem.
     """
-    n, W = layout.agents, layout.width
-    own = ridge * regression.windows
-    peers = own * weight**2
-    if all(len(members) == n for members in layout.members):
-        return _solve_each(regression.zz, regression.zy, W, own, peers)
-    x = np.zeros((n, n * W, layout.rows))
+    x = np.zeros((layout.agents, layout.agents * layout.width, layout.rows))
     for i, members in enumerate(layout.members):
-        rows = (np.array(members)[:, None] * W + np.arange(W)).ravel()
-        penalty = np.where(rows // W == i, own, peers)
-        factor = factorise(_add_penalty(regression.zz[np.ix_(rows, rows)], penalty))
+        rows = _columns_of(members, layout)
+        A = regression.zz[np.ix_(rows, rows)]
+        penalty = np.where(rows // layout.width == i, 1.0, weight**2)
+        A.flat[:: len(A) + 1] += ridge * regression.windows * penalty
+        factor = factorise(A.T)  # symmetric, and in LAPACK's order
         x[i, rows] = linalg.cho_solve((factor, True), regression.zy[rows, i], check_finite=False)
     return x
 
@@ -156,18 +138,12 @@ def to_physical(x: Array, layout: Layout) -> Array:
     return np.ascontiguousarray(blocks * y_scale[:, None] / z_scale)
 
 
-def scaled_blocks(G: Array, layout: Layout) -> Array:
-    """Blocks that map scaled signals to scaled signals, of the shape of `G`."""
-    z_scale, y_scale = layout.scales()
-    return G * z_scale / y_scale[:, None]
-
-
 def _sample_gram(episodes: Sequence[Episode], layout: Layout) -> tuple[Array, int]:
     """Gram matrix of windows of scaled [u of all agents; y of all], and how many windows."""
     check_episodes(episodes, layout)
     signals = [np.concatenate(each.scaled_deviations(layout), axis=1) for each in episodes]
     L = layout.T_ini + layout.N
-    return gram(signals, L), columns(signals, L)
+    return gram(signals, L), sum(each.samples - L + 1 for each in episodes)
 
 
 def _by_agent(index: Index, n: int, dim: int) -> Index:
@@ -175,71 +151,21 @@ def _by_agent(index: Index, n: int, dim: int) -> Index:
     return index.reshape(-1, n, dim).transpose(1, 0, 2).reshape(n, -1)
 
 
-def _past_first(layout: Layout, members: Sequence[int]) -> Index:
-    """Rows of `zz` of some agents by time: all [u_ini; y_ini], then each sample's inputs."""
-    rows = np.arange(layout.agents * layout.width).reshape(layout.agents, -1)[list(members)]
-    future = rows[:, layout.past :].reshape(len(members), layout.N, layout.inputs)
-    return np.concatenate([rows[:, : layout.past].ravel(), future.transpose(1, 0, 2).ravel()])
-
-
-def _add_penalty(A: Array, penalty: Array | float) -> Array:
-    """A copy of `A` in LAPACK's order with a penalty on its diagonal."""
-    copy: Array = A.T.copy(order="F")  # symmetric: the transpose is the same and copies faster
-    copy.flat[:: len(A) + 1] += penalty
-    return copy
+def _columns_of(members: Sequence[int], layout: Layout) -> Index:
+    rows: Index = (np.array(members)[:, None] * layout.width + np.arange(layout.width)).ravel()
+    return rows
 
 
 def _solve_least_norm(A: Array, b: Array) -> Array:
     floor = _RANK_TOLERANCE * float(np.linalg.norm(A))
     try:  # Cholesky shows much faster that no eigenvalue is small
-        factorise(_add_penalty(A, -floor))
+        factorise((A - floor * np.eye(len(A))).T)
     except PredictorError:
         values, vectors = linalg.eigh(A, check_finite=False)
         significant = values > floor
         V = vectors[:, significant]
         return V @ ((V.T @ b) / values[significant, None])
-    x: Array = linalg.cho_solve((factorise(A.copy(order="F")), True), b, check_finite=False)
-    return x
-
-
-def _solve_each(A: Array, b: Array, W: int, own: float, peers: float) -> Array:
-    """Solutions x_i of (A + D_i) x_i = b_i, D_i = own on block i and peers on all others.
-
-    One half of the blocks, all with the peers' penalty, is eliminated, which leaves the same
-    problem for the other half; so all n solutions cost 7/3 of one factorisation. Correcting one
-    common factorisation for each block would lose digits where the ratio of the penalties is large.
-
-    Args:
-        A: shape (n W, n W).
-        b: right-hand sides, shape (n W, n, k).
-        W: size of a block.
-        own: penalty on the own block.
-        peers: penalty on the others.
-
-    Returns:
-        Shape (n, n W, k).
-    """
-    n, k = len(A) // W, b.shape[2]
-    if n == 1:
-        factor = factorise(_add_penalty(A, own))
-        return linalg.cho_solve((factor, True), b[:, 0], check_finite=False)[None]
-    x = np.empty((n, n * W, k))
-    for half, eliminated in (
-        (slice(0, n // 2), slice(n // 2, n)),
-        (slice(n // 2, n), slice(0, n // 2)),
-    ):
-        K, D = (slice(s.start * W, s.stop * W) for s in (half, eliminated))
-        factor = factorise(_add_penalty(A[D, D], peers))
-        X, R = (
-            linalg.solve_triangular(factor, rhs, lower=True, check_finite=False)
-            for rhs in (A[D, K], b[D, half].reshape(D.stop - D.start, -1))
-        )
-        rest = b[K, half] - (X.T @ R).reshape(K.stop - K.start, -1, k)
-        solution = _solve_each(A[K, K] - X.T @ X, rest, W, own, peers)
-        x[half, K] = solution
-        across = R - (X @ solution.transpose(1, 0, 2).reshape(K.stop - K.start, -1))
-        back = linalg.solve_triangular(factor, across, lower=True, trans=1, check_finite=False)
-        x[half, D] = back.reshape(D.stop - D.start, -1, k).transpose(1, 0, 2)
+    x: Array = linalg.cho_solve((factorise(A.T), True), b, check_finite=False)
     return x
 
 
@@ -274,7 +200,7 @@ def reduce(episodes: Sequence[Episode], layout: Layout) -> Reduction:
     Raises:
         PredictorError: no data, too little, of another plant, or inputs that do not excite.
     """
-    S, windows = _sample_gram(episodes, layout)
+    S, _ = _sample_gram(episodes, layout)
     n, m, p, T_ini = layout.agents, layout.inputs, layout.outputs, layout.T_ini
     index = np.arange(len(S)).reshape(-1, n * (m + p))
     a, b = (
@@ -282,16 +208,7 @@ def reduce(episodes: Sequence[Episode], layout: Layout) -> Reduction:
         for x, dim in ((index[:, : n * m], m), (index[:, n * m :], p))
     )
     S_aa, S_ab = S[np.ix_(a, a)], S[np.ix_(a, b)]
-    try:
-        factorise(S_aa - _RANK_TOLERANCE * float(np.linalg.norm(S_aa)) * np.eye(len(a)))
-    except PredictorError:
-        raise PredictorError(
-            "episodes",
-            f"inputs in {windows} windows that are not persistently exciting of order "
-            f"{T_ini + layout.N}",
-            f"a Hankel matrix of rank {len(a)}",
-            "too little data, or too little noise in the inputs",
-        ) from None
+    check_excitation([each.scaled_deviations(layout)[0] for each in episodes], T_ini + layout.N)
     factor = linalg.cho_factor(S_aa, check_finite=False)
     solved = linalg.cho_solve(factor, np.hstack([S_ab, np.eye(len(a))]), check_finite=False)
     response, inverse = solved[:, : len(b)].T, solved[:, len(b) :]

@@ -6,7 +6,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -17,7 +17,8 @@ from quadriga.agents.predictor.gates import (
     GateReport,
     Provenance,
     coupling_table,
-    squared_errors,
+    held_out_error,
+    radius_limit,
 )
 from quadriga.agents.predictor.predictor import KINDS, Predictor
 from quadriga.agents.predictor.store import predictor_sha256
@@ -42,8 +43,6 @@ from quadriga.tables import (
     format_output,
     print_tables,
 )
-
-_SHOWN: Final = 5  # samples of the horizon that a terminal shows
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,17 +137,15 @@ def fit_and_report(config: Config, console: Console, *, every: bool) -> Path:
         if kind == config.identification.predictor:
             mine = reports[-1]
     if every:
-        sheets = whole = [build_comparison(reports)]
+        sheets = [build_comparison(reports)]
         stem, title = path.with_name(f"{path.stem}-all"), "Predictors"
         write_json(stem.with_suffix(".json"), [report.to_dict() for report in reports])
     else:
         stem, title, (one,) = path.with_suffix(""), f"Predictor {reports[0].name}", reports
-        sheets, whole = ([], [])
-        if isinstance(one, FitReport):
-            sheets, whole = build_report_tables(one), build_report_tables(one, whole=True)
+        sheets = build_report_tables(one) if isinstance(one, FitReport) else []
     figure = stem.with_suffix(".png")
     draw([report for report in reports if isinstance(report, FitReport)], figure)
-    parts = [f"# {title}\n", *(sheet.to_markdown() for sheet in whole)]
+    parts = [f"# {title}\n", *(sheet.to_markdown() for sheet in sheets)]
     parts.append(f"![Held-out error over the horizon]({figure.name})\n")
     write_text(stem.with_suffix(".md"), "\n".join(parts))
     print_tables(sheets)
@@ -166,10 +163,9 @@ def report_fit(config: Config, dataset: Dataset, name: str, console: Console) ->
         predictor, provenance = fit_or_read(config, console, dataset)
     except PredictorError as error:
         return Unfit(name, error)
-    _, squares, naive = squared_errors(predictor, dataset.held_out)
+    rmse, persistence, _ = held_out_error(predictor, dataset.held_out)
     refused = refusal(provenance.gates, config)
-    errors = np.sqrt(squares), np.sqrt(naive)
-    report = FitReport(name, config, predictor, provenance, *errors, refused)
+    report = FitReport(name, config, predictor, provenance, rmse, persistence, refused)
     write_json(predictor_path(config).with_suffix(".json"), report.to_dict())
     return report
 
@@ -180,41 +176,36 @@ def write_json(path: Path, body: Any) -> None:
     write_text(path, json.dumps(body, indent=2, ensure_ascii=False) + "\n")
 
 
-def build_report_tables(report: FitReport, *, whole: bool = False) -> list[Table]:
-    """Everything about one predictor; `whole`: with the errors at every sample of the horizon."""
+def overall(errors: Array) -> list[float]:
+    """RMSE of each output over the horizon, from those by sample, (N, 6)."""
+    overall: list[float] = np.sqrt((errors**2).mean(axis=0)).tolist()
+    return overall
+
+
+def build_report_tables(report: FitReport) -> list[Table]:
+    """Everything about one predictor but its errors by sample of the horizon."""
     N, robots = len(report.rmse), robot_names(report.predictor.layout.agents)
-    shown = range(N) if whole else np.linspace(0, N - 1, min(N, _SHOWN)).round().astype(int)
-    held, harm = report.gates.rmse_persistence, report.gates.harm
+    harm = report.gates.harm
     outputs = [
         (
             label,
             format_output(name, rmse),
-            format_output(name, held[name]),
-            format_number(rmse / held[name] if held[name] else None, ".2f"),
+            format_output(name, held),
+            format_number(rmse / held if held else None, ".2f"),
             "{:.1f} ({:.1f} … {:.1f})".format(*(100.0 * x for x in harm[name]))
             if name in harm
             else NOTHING,
         )
-        for (name, rmse), label in zip(report.gates.rmse.items(), LABELS, strict=True)
-    ]
-    horizon = [
-        (
-            f"{SAMPLE_MS * (k + 1)} ms",
-            *(
-                f"{format_output(name, ours)} / {format_output(name, theirs)}"
-                for name, ours, theirs in zip(
-                    OUTPUTS, report.rmse[k], report.persistence[k], strict=True
-                )
-            ),
+        for name, label, rmse, held in zip(
+            OUTPUTS, LABELS, overall(report.rmse), overall(report.persistence), strict=True
         )
-        for k in shown
     ]
     coupling = [
         (robot, *map(format_number, row))
         for robot, row in zip(robots, coupling_table(report.predictor).tolist(), strict=True)
     ]
     note = (
-        f"All robots, {report.gates.windows} held-out windows of {N} samples. By peers: how much "
+        f"All robots, held-out windows of {N} samples. By peers: how much "
         "larger the squared error is with the predicted effect of the peers' forces than without "
         "it, with a 95 % interval. Of a planner whose agents respond to each other's plans, "
         f"certainly more than {100.0 * report.config.identification.max_peers_harm:g} % is refused."
@@ -224,7 +215,6 @@ def build_report_tables(report: FitReport, *, whole: bool = False) -> list[Table
     return [
         _build_figures(report, robots),
         Table("Held-out error", columns, tuple(outputs), (note,)),
-        Table("RMSE / persistence over the horizon", ("ahead", *LABELS), tuple(horizon)),
         Table("Coupling", ("", *robots), tuple(coupling), (norms,)),
     ]
 
@@ -241,7 +231,7 @@ def build_comparison(reports: Sequence[FitReport | Unfit]) -> Table:
         rows.append(
             (
                 report.name,
-                *(format_output(name, gates.rmse[name]) for name in OUTPUTS),
+                *map(format_output, OUTPUTS, overall(report.rmse)),
                 format_number(gates.error),
                 f"{min(gains):.2f} … {max(gains):.2f}",
                 format_number(gates.radius),
@@ -253,15 +243,15 @@ def build_comparison(reports: Sequence[FitReport | Unfit]) -> Table:
     notes = [f"{r.name}: refused: {reason(r.refused)}." for r in reports if r.refused]
     for fitted in [report for report in reports if isinstance(report, FitReport)][:1]:
         gates, limits = fitted.gates, fitted.config.identification
-        held = [format_output(name, gates.rmse_persistence[name]) for name in OUTPUTS]
+        held = [*map(format_output, OUTPUTS, overall(fitted.persistence))]
         rows.append(("persistence", *held, "1", *(NOTHING,) * (len(columns) - 2 - len(held))))
         low, high = limits.gain_range
         notes.insert(
             0,
-            f"RMSE over the horizon on {gates.windows} held-out windows, all robots; error: of all "
+            f"RMSE over the horizon on held-out windows, all robots; error: of all "
             f"outputs, scaled, over that of persistence (limit 1); limits of height gains "
             f"{low:g} … {high:g}; radius: of the iteration of the robots' plans (limit "
-            f"{gates.radius_limit(fitted.config):g}).",
+            f"{radius_limit(fitted.config):g}).",
         )
     return Table("Predictors on the same data: held-out RMSE", columns, tuple(rows), notes)
 
@@ -281,9 +271,9 @@ def _build_figures(report: FitReport, robots: Sequence[str]) -> Table:
             for robot, row in zip(robots, gates.gains, strict=True)
         ),
         (
-            f"{gates.iteration} radius",
+            "radius of the iteration of plans",
             format_number(gates.radius),
-            f"< {gates.radius_limit(report.config):g}",
+            f"< {radius_limit(report.config):g}",
         ),
         ("size of G", f"{report.megabytes:.1f} MB", ""),
         ("fit", f"{format_number(origin.fit_seconds, '.1f')} s", ""),

@@ -11,8 +11,9 @@ from typing import Any, Final
 
 from rich.console import Console
 
+from quadriga.agents.predictor.episode import N_WRENCH
 from quadriga.agents.predictor.gates import GateReport, Provenance, gates_in_force, read, run_gates
-from quadriga.agents.predictor.measured_response import read_pulse_responses
+from quadriga.agents.predictor.periodic import DEGREE
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.predictor.predictor import fit as fit_predictor
 from quadriga.agents.predictor.store import save, versions
@@ -23,8 +24,10 @@ from quadriga.progress import build_progress
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import config_sha256
 from quadriga.shared.errors import PredictorError, PredictorFileError, QuadrigaError
+from quadriga.shared.robots.conventions import N_OUTPUTS, Array
 from quadriga.shared.runtime.arithmetic import use_one_blas_thread
 from quadriga.shared.runtime.clock import monotonic
+from quadriga.shared.runtime.npz import UNREADABLE, as_measured, open_npz
 
 # What a true response depends on beside the controller: of a predictor's meta, and sections.
 _TEAM: Final = (
@@ -98,10 +101,10 @@ def fit(config: Config, dataset: Dataset, path: Path) -> Judged:
         PredictorFileError: configured responses that are missing, or of another team.
     """
     check_excitation(config, dataset.training)
-    check_measured_team(config)
+    response = read_response(config)
     use_one_blas_thread()
     begun = monotonic()
-    predictor = fit_predictor(dataset.training, PredictorMeta.of(config))
+    predictor = fit_predictor(dataset.training, PredictorMeta.of(config), response=response)
     provenance = Provenance(
         config_digest=config_sha256(config),
         seeds=dataset.seeds,
@@ -127,21 +130,36 @@ def measured_team(config: Config) -> dict[str, Any]:
     return team
 
 
-def check_measured_team(config: Config) -> None:
-    """Refuse configured responses of another team.
+def read_response(config: Config) -> Array | None:
+    """The measured response that stands for a fitted one; None if none is configured.
+
+    Returns:
+        Its coefficients, see `fit_periodic`.
 
     Raises:
-        PredictorFileError: no such file, not one of responses, or of another team.
+        PredictorFileError: no such file, not one of a response, or of another team.
     """
     if not config.response_file:
-        return
-    measured = read_pulse_responses(Path(config.response_file)).team
-    for key, expected in measured_team(config).items():
-        if measured.get(key) != expected:
-            got = f"responses of a team with {key} = {measured.get(key)!r}"
-            raise PredictorFileError(
-                "identification.response", got, f"{expected!r}", "measure it: `quadriga probe`"
-            )
+        return None
+    name, path, n = "identification.response", Path(config.response_file), config.team.robots
+    try:
+        with open_npz(path) as archive:
+            response = as_measured("response", archive["response"], 6)
+            team = {**json.loads(str(archive["team"]))}
+    except UNREADABLE as error:
+        got = "no such file" if isinstance(error, FileNotFoundError) else type(error).__name__
+        expected = "what `quadriga probe --out DIR` wrote"
+        cause = "measure it with the same team"
+        raise PredictorFileError(f"{name} {path}", got, expected, cause) from None
+    for key, value in measured_team(config).items():
+        if team.get(key) != value:
+            got = f"responses of a team with {key} = {team.get(key)!r}"
+            raise PredictorFileError(name, got, f"{value!r}", "measure it: `quadriga probe`")
+    shape = (2 * DEGREE + 2, config.planner.N, n, N_WRENCH, n, N_OUTPUTS)
+    if response.shape != shape:
+        got = f"a response of shape {response.shape}"
+        raise PredictorFileError(name, got, f"{shape}", "another horizon?")
+    return response
 
 
 def refusal(gates: GateReport, config: Config) -> PredictorError | None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from quadriga.agents.gait import nominal_forces, sample_starts, scheduled_stance
 from quadriga.agents.predictor.episode import U_SCALE, Y_SCALE, Episode
-from quadriga.agents.predictor.gates import coupling_table, run_gates
+from quadriga.agents.predictor.gates import coupling_table, held_out_error, run_gates
 from quadriga.agents.predictor.predictor import KINDS, PredictorMeta, fit
 from quadriga.identification.behaviour import numbers
 from quadriga.shared.config.load import load
@@ -40,7 +40,7 @@ def samples() -> Iterator[Array]:
             yield numbers(gates.error, gates.radius)
             yield from (np.array(gates.gains), coupling_table(predictor))
             yield from (numbers(*bounds) for bounds in gates.harm.values())
-            yield np.array([*gates.rmse.values(), *gates.rmse_persistence.values()])
+            yield np.array(held_out_error(predictor, (held_out,))[:2])
 
 
 def linear_episode(config: Config, samples: int, seed: int) -> Episode:

@@ -24,7 +24,7 @@ from quadriga.shared.config.load import load
 from tests.fuzz.damage import damage
 from tests.fuzz.target import change_json
 
-REPORT: Final = GateReport(1, {}, {}, 0.5, ((1.0, 1.0),), 0.1)
+REPORT: Final = GateReport(0.5, ((1.0, 1.0),), 0.1)
 SMALL: Final = {"team.robots": 1, "planner.kind": "none", "planner.N": 8, "planner.T_ini": 4}
 _EDGE: Final = 1000  # bytes at the begin and at the end, which tell of the arrays between
 _SHAPES: Final = ((), (0,), (1,), (3, 0), (2, 2, 2, 2, 2), (1, 1, 4, 12), (1 << 20,))

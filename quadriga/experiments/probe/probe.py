@@ -9,14 +9,13 @@ from typing import Final
 
 from rich.console import Console
 
-from quadriga.agents.predictor.measured_response import PulseResponses, write_pulse_responses
 from quadriga.experiments.probe.cache import ensure_responses
+from quadriga.experiments.probe.measured_response import write_measured_response
 from quadriga.experiments.probe.outcome import ProbeOutcome, build_outcome
 from quadriga.experiments.probe.probe_figure import draw_probe
 from quadriga.experiments.probe.probe_tables import build_details, build_overall
 from quadriga.experiments.probe.probed import Probed
 from quadriga.identification.fit_report import write_json
-from quadriga.identification.predictors import measured_team
 from quadriga.shared.config.sections import Config
 from quadriga.shared.runtime.atomic import write_text
 
@@ -48,12 +47,9 @@ def probe(
 
 
 def write_outcome(outcome: ProbeOutcome, folder: Path) -> None:
-    """Write a probe's figures as JSON, its tables as Markdown, its picture and the responses."""
+    """Write a probe's figures as JSON, its tables as Markdown, its picture and the response."""
     write_json(folder / FIGURES, outcome.to_dict())
-    measured = outcome.responses
-    team = measured_team(outcome.config)
-    truth = PulseResponses(measured.ticks, measured.u, measured.y, team)
-    write_pulse_responses(folder / RESPONSES, truth)
+    write_measured_response(folder / RESPONSES, outcome.responses, outcome.config)
     draw_probe(outcome, folder / _PICTURE)
     sheets = [build_overall(outcome), *build_details(outcome)]
     parts = ["# Probe\n", *(sheet.to_markdown() for sheet in sheets)]

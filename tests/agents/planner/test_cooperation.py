@@ -25,7 +25,7 @@ from quadriga.agents.planner.cooperation import (
 from quadriga.agents.planner.peers import PeerData, Peers
 from quadriga.agents.planner.planner import Planner, PlannerState
 from quadriga.agents.planner.team import build_centralised
-from quadriga.agents.predictor.gates import are_same_costs, iteration_radius, probe_costs, run_gates
+from quadriga.agents.predictor.gates import iteration_radius, radius_limit, run_gates
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
@@ -272,13 +272,10 @@ def test_too_little_of_the_last_plan_is_refused(small: Config, linear_team: Team
         run_gates(plant, exact, [linear_team(3).episode(200, 50)]),
         radius=cooperative_radius(plant, wild),
     )
-    assert (report.cost, report.radius_limit(plant)) == ("team", 1.0)
+    assert radius_limit(plant) == 1.0
     with pytest.raises(PredictorError, match=r"cooperative map.*below 1.*planner\.damping"):
         report.check(plant)
-    automatic = cooperative(plant, damping=0.0)
-    assert cooperative_radius(automatic, wild) < 1.0
-    probes = [probe_costs(c, wild) for c in (plant, automatic, small_own(plant))]
-    assert not any(are_same_costs(a, b) for k, a in enumerate(probes) for b in probes[k + 1 :])
+    assert cooperative_radius(cooperative(plant, damping=0.0), wild) < 1.0
 
 
 def small_own(config: Config) -> Config:

@@ -8,20 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from quadriga.agents.gait import gait_phase, nominal_forces, scheduled_stance
-from quadriga.agents.predictor.episode import N_WRENCH, Y_SCALE, Episode, wrench_map
+from quadriga.agents.predictor.episode import Y_SCALE, Episode, wrench_map
 from quadriga.agents.predictor.gates import coupling_table, held_out_error
-from quadriga.agents.predictor.periodic import (
-    PeriodicFactors,
-    harmonics,
-    held_samples,
-    polynomials,
-    shrink,
-    spread_over_samples,
-)
+from quadriga.agents.predictor.periodic import PeriodicFactors, polynomials
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta, fit, fit_plant
 from quadriga.agents.predictor.store import load, predictor_sha256, save
 from quadriga.shared.config.sections import Config
@@ -154,9 +145,9 @@ def test_what_has_no_effect_has_exactly_none(chain: Trotters, fitted: Predictor)
 
 def test_held_out_data_are_predicted_up_to_their_noise(chain: Trotters, fitted: Predictor) -> None:
     exact = chain.episode(9, 600, noise=0.0)
-    _, rmse, _, _ = held_out_error(fitted, [exact])
+    rmse, _, _ = held_out_error(fitted, [exact])
     forgetful = np.sqrt(np.mean(exact.y**2, axis=(0, 1)))
-    assert (np.array(rmse) < 0.3 * forgetful).all()
+    assert (np.sqrt((rmse**2).mean(axis=0)) < 0.3 * forgetful).all()
 
 
 def test_strangers_are_left_out_if_only_yoked_robots_count() -> None:
@@ -186,7 +177,7 @@ def test_blocks_rows_and_the_whole_of_G_are_the_same(fitted: Predictor) -> None:
     assert not table[[0, 2], [2, 0]].any()
 
 
-def test_what_is_saved_is_read(tmp_path: Path, fitted: Predictor) -> None:
+def test_what_is_saved_is_read_and_what_is_wrong_refused(tmp_path: Path, fitted: Predictor) -> None:
     digest = save(tmp_path / "periodic.npz", fitted)
     again, _ = load(tmp_path / "periodic.npz")
     assert isinstance(again.parts, PeriodicFactors)
@@ -194,10 +185,7 @@ def test_what_is_saved_is_read(tmp_path: Path, fitted: Predictor) -> None:
     np.testing.assert_array_equal(again.block(1, 2, 17), fitted.block(1, 2, 17))
     with pytest.raises(PredictorError, match=r"arrays of \(3,\) agents, expected 2"):
         Predictor(meta_of(2), fitted.parts)
-
-
-def test_data_too_few_to_be_divided_are_refused() -> None:
-    with pytest.raises(PredictorError, match="periodic predictor"):
+    with pytest.raises(PredictorError, match="data for the periodic predictor"):
         fit([Trotters(1, ()).episode(1, 16)], meta_of(1))
 
 
@@ -233,7 +221,7 @@ def test_the_response_of_any_plant_is_found_at_every_phase(hold: int, unit: floa
     predictor = fit_plant([data], "periodic", PAST, HORIZON, period=PERIOD, input_map=ACTIONS)
     assert predictor.phases == PERIOD
     timeless = fit_plant([data], "ridge", PAST, HORIZON)
-    assert held_out_error(predictor, [unseen])[3] < 0.5 * held_out_error(timeless, [unseen])[3]
+    assert held_out_error(predictor, [unseen])[2] < 0.5 * held_out_error(timeless, [unseen])[2]
     assert not predictor.couples(0, 1), "agent 1 does nothing to agent 0"
     for phase in (0, 13):
         forced = unit * predictor.future_block(1, 0, phase).reshape(HORIZON, 2, HORIZON, 3)
@@ -252,23 +240,6 @@ def test_the_response_of_any_plant_is_found_at_every_phase(hold: int, unit: floa
 # ---- parts
 
 
-@given(order=st.integers(0, 8))
-def test_harmonics_are_orthonormal_over_a_period(order: int) -> None:
-    F = harmonics(2 * np.pi * np.arange(40) / 40, order)
-    np.testing.assert_allclose(F.T @ F / 40, np.eye(2 * order + 1), atol=1e-12)
-
-
-@given(degree=st.integers(0, 5))
-def test_polynomials_are_orthonormal_and_of_one_half_each(degree: int) -> None:
-    nodes, weights = np.polynomial.legendre.leggauss(degree + 2)
-    angle = np.concatenate([np.pi * (nodes + 1) / 2, np.pi + np.pi * (nodes + 1) / 2])
-    F = polynomials(angle, degree)
-    gram = F.T @ (np.tile(weights, 2)[:, None] / 4 * F)
-    np.testing.assert_allclose(gram, np.eye(2 * degree + 2), atol=1e-4)  # angles are nudged by 1e-6
-    assert not F[: degree + 2, degree + 1 :].any()
-    assert not F[degree + 2 :, : degree + 1].any()
-
-
 def test_a_half_begins_where_the_feet_change_whatever_the_rounding() -> None:
     """Phases 0 and 20 of 40, and those of later periods."""
     phases = np.array([0, 20, 40, 60, 80, 100, 119, 120])
@@ -283,47 +254,3 @@ def test_a_samples_angle_is_that_of_the_phase_it_begins_in() -> None:
         phase = gait_phase(1000 + 10 * k, meta.stand_ms, meta.stance_ms, 40)
         assert angle == pytest.approx(2 * np.pi * phase / 40)
     assert meta.period.angle_step == pytest.approx(2 * np.pi / 40)
-
-
-@settings(max_examples=20, deadline=None)
-@given(seed=st.integers(0, 2**31), hold=st.integers(1, 3))
-def test_single_samples_add_up_to_a_held_draw(seed: int, hold: int) -> None:
-    """A response that is smooth in its lag is found again from that to held draws."""
-    random, step, N = np.random.default_rng(seed), 2 * np.pi / 40, 25
-    decay = np.exp(-0.1 * np.arange(N))[:, None] * np.cos(0.2 * np.arange(N))[:, None]
-    h = random.normal(size=(6, 1, 4)) * decay
-    starts = np.array([k for k in range(40) if k % 20 + hold <= 20]) * step
-    F = polynomials(starts, 2)  # of draws that end in the half in which they begin
-    held = np.zeros((len(starts), N, 4))
-    for m in range(hold):
-        response = np.tensordot(polynomials(starts + m * step, 2), h, axes=1)
-        held[:, m:] += response[:, : N - m]
-    g = np.tensordot(np.linalg.pinv(F), held, axes=1)
-    found = spread_over_samples(g, hold, step)
-    assert np.linalg.norm(found - h) < 0.05 * np.linalg.norm(h)
-
-
-@given(hold=st.integers(1, 5), begin=st.integers(0, 4))
-def test_how_long_forces_are_held_is_found_in_the_data(hold: int, begin: int) -> None:
-    random, T = np.random.default_rng(hold), 120
-    u = np.repeat(random.normal(size=(T, 1, 12)), hold, axis=0)[hold - begin % hold :][:T]
-    assert held_samples([u]) == held_samples([u, 0.0 * u]) == hold
-
-
-@settings(max_examples=10, deadline=None)
-@given(seed=st.integers(0, 2**31))
-def test_noise_is_no_effect_of_peers_and_what_is_clear_is_left_as_it_is(seed: int) -> None:
-    random, F, n = np.random.default_rng(seed), 10, 2
-    shape = (5, 6, n, N_WRENCH, n, 6)
-    truth = np.zeros(shape)
-    truth[:, :, range(n), :, range(n)] = random.normal(size=(n, 5, 6, N_WRENCH, 6))
-    truth[:, :, 0, :, 1, 2] = 0.5 * random.normal(size=(5, 6, N_WRENCH))  # robot 1, output vy
-    folds = truth + 0.02 * random.normal(size=(F, *shape))
-    estimate = folds.mean(axis=0)
-    response, kept = shrink(estimate, (F * estimate - folds) / (F - 1))
-    expected = np.zeros((n, n, 6), dtype=bool)
-    expected[range(n), range(n)] = True
-    expected[1, 0, 2] = True
-    np.testing.assert_array_equal(kept, expected)
-    assert np.linalg.norm(response - truth) < 0.05 * np.linalg.norm(truth)
-    assert not response[:, :, 1, :, 0].any()

@@ -13,13 +13,7 @@ from hypothesis import strategies as st
 from quadriga.agents.predictor.episode import Episode, Layout, everyone
 from quadriga.agents.predictor.hankel import hankel, split
 from quadriga.agents.predictor.predictor import PredictorMeta, fit, fit_plant
-from quadriga.agents.predictor.regression import (
-    normal_equations,
-    reduce,
-    scaled_blocks,
-    solve_ridge,
-    to_physical,
-)
+from quadriga.agents.predictor.regression import normal_equations, reduce, solve_ridge, to_physical
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robots.conventions import Array
 from tests.agents.predictor.plants import Sizes, first_window, random_plant, record
@@ -66,8 +60,8 @@ def test_every_kind_gives_the_true_response_of_a_linear_plant(
 def test_pinv_is_the_pseudo_inverse_of_equation_6(sizes: Sizes, noise: float) -> None:
     data = record(random_plant(sizes, 1), sizes, (160, 90), 2, noise)
     u, y = ([getattr(e, name).reshape(e.samples, -1) for e in data] for name in ("u", "y"))
-    parts = split(u, y, T_INI, N)
-    G = parts.Y_f @ np.linalg.pinv(np.vstack([parts.U_p, parts.Y_p, parts.U_f]))
+    U_p, Y_p, U_f, Y_f = split(u, y, T_INI, N)
+    G = Y_f @ np.linalg.pinv(np.vstack([U_p, Y_p, U_f]))
     past_u, past_y, future_u, _ = first_window(data[0], T_INI, N)
     written = G @ np.concatenate([past_u.ravel(), past_y.ravel(), future_u.ravel()])
     found = fit_plant(data, "pinv", T_INI, N).forecast(past_u, past_y, future_u)
@@ -87,29 +81,19 @@ def test_units_do_not_matter() -> None:
         np.testing.assert_allclose(theirs, ours, rtol=1e-7, atol=1e-9 * np.abs(ours).max())
 
 
-@pytest.mark.parametrize(("agents", "weight"), [(1, 160.0), (2, 1.0), (3, 160.0), (5, 1e4)])
-def test_shared_eliminations_solve_what_each_agent_would_alone(agents: int, weight: float) -> None:
-    layout = layout_of(agents)
-    regression = normal_equations(data_of(agents), layout)
-    x = solve_ridge(regression, layout, 1e-3, weight)
-    for i in range(agents):
-        penalty = 1e-3 * regression.windows * np.where(np.arange(agents) == i, 1.0, weight**2)
-        A = regression.zz + np.diag(np.repeat(penalty, layout.width))
-        np.testing.assert_allclose(x[i], np.linalg.solve(A, regression.zy[:, i]), atol=1e-10)
-
-
-def test_block_weighted_ridge_solves_its_normal_equations() -> None:
+@pytest.mark.parametrize(("agents", "weight"), [(1, 160.0), (2, 7.0), (3, 160.0), (5, 1e4)])
+def test_ridge_solves_its_normal_equations(agents: int, weight: float) -> None:
     """Gradient of the penalised least-squares cost, from the explicit windows, is zero."""
-    layout, data = layout_of(2), data_of(2)
-    x = solve_ridge(normal_equations(data, layout), layout, 1e-2, 7.0)
-    G = scaled_blocks(to_physical(x, layout), layout)
+    layout, data = layout_of(agents), data_of(agents)
+    x = solve_ridge(normal_equations(data, layout), layout, 1e-2, weight)
     z_scale, y_scale = layout.scales()
+    G = to_physical(x, layout) * z_scale / y_scale[:, None]
     z, y = data[0].windows(T_INI, N)
     Z = z / z_scale[:, None]
-    for i in range(2):
-        residual = y[i] / y_scale[:, None] - sum(G[i, j] @ Z[j] for j in range(2))
-        for j in range(2):
-            penalty = 1e-2 * z.shape[2] * (1.0 if i == j else 49.0)
+    for i in range(agents):
+        residual = y[i] / y_scale[:, None] - sum(G[i, j] @ Z[j] for j in range(agents))
+        for j in range(agents):
+            penalty = 1e-2 * z.shape[2] * (1.0 if i == j else weight**2)
             np.testing.assert_allclose(residual @ Z[j].T, penalty * G[i, j], atol=1e-7)
 
 
@@ -128,15 +112,6 @@ def test_agents_that_are_no_members_are_left_out_and_change_nothing(kind: str) -
         np.testing.assert_allclose(whole.block(0, j), pair.block(0, j), atol=1e-10)
 
 
-def test_peers_weigh_less_if_asked() -> None:
-    plain, weighted = (
-        fit_plant(data_of(2, 0.5), "ridge", T_INI, N, ridge=1e-2, block_weight=weight)
-        for weight in (1.0, 50.0)
-    )
-    assert np.linalg.norm(weighted.block(0, 1)) < 0.5 * np.linalg.norm(plain.block(0, 1))
-    assert np.linalg.norm(weighted.block(0, 0)) > 0.5 * np.linalg.norm(plain.block(0, 0))
-
-
 def test_inputs_that_do_not_excite_are_refused_without_a_penalty() -> None:
     data = data_of(1)
     dead = [replace(data[0], u=data[0].u * [1.0, 0.0])]
@@ -144,9 +119,9 @@ def test_inputs_that_do_not_excite_are_refused_without_a_penalty() -> None:
     regression = normal_equations(dead, layout_of(1))
     with pytest.raises(PredictorError, match=r"a larger ridge \(identification\.ridge\)"):
         solve_ridge(regression, layout_of(1), 0.0, 1.0)
-    with pytest.raises(PredictorError, match="rank 7, expected rank 14: persistently exciting"):
+    with pytest.raises(PredictorError, match="rank below 14, expected rank 14"):
         fit_plant(twins, "pinv", T_INI, N)
-    with pytest.raises(PredictorError, match="not persistently exciting of order 7"):
+    with pytest.raises(PredictorError, match="persistently exciting of order 7"):
         reduce(dead, layout_of(1))
 
 

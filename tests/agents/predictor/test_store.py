@@ -24,21 +24,13 @@ from tests.agents.predictor.plants import Sizes, random_plant, record
 WRONG = "expected a predictor that quadriga wrote"
 
 
-def test_what_is_saved_is_read(stored: Path, fitted: tuple[Predictor, Provenance]) -> None:
-    predictor, provenance = read(stored)
-    assert predictor.G.tobytes() == fitted[0].G.tobytes()
-    assert predictor.meta == fitted[0].meta
-    assert provenance == fitted[1]
-    assert {"python", "numpy", "scipy"} <= provenance.versions.keys()
-    assert list(stored.parent.iterdir()) == [stored]
-    assert sorted(zipfile.ZipFile(stored).namelist()) == ["G.npy", "document.npy"]
-
-
 def test_a_predictor_of_any_plant_is_loaded_and_is_none_of_a_team(tmp_path: Path) -> None:
     sizes, path = Sizes(2, 1, 2, 3), tmp_path / "new" / "plant.npz"
     data = record(random_plant(sizes, 1), sizes, (200,), 2, 0.1)
     predictor = fit_plant(data, "ridge", 3, 4)
     digest = save(path, predictor)
+    assert sorted(zipfile.ZipFile(path).namelist()) == ["G.npy", "document.npy"]
+    assert list(path.parent.iterdir()) == [path]
     again, provenance = load(path)
     assert (again.meta, predictor_sha256(again), provenance) == (predictor.meta, digest, None)
     np.testing.assert_array_equal(again.G, predictor.G)
@@ -48,6 +40,7 @@ def test_a_predictor_of_any_plant_is_loaded_and_is_none_of_a_team(tmp_path: Path
 
 def test_the_digest_is_of_the_content(tmp_path: Path, fitted: tuple[Predictor, Provenance]) -> None:
     predictor, provenance = fitted
+    assert {"python", "numpy", "scipy"} <= provenance.versions.keys()
     elsewhere = asdict(replace(provenance, config_digest="another machine"))
     digests = {save(tmp_path / name, predictor, elsewhere) for name in ("a.npz", "b.npz")}
     assert digests == {predictor_sha256(predictor)}
@@ -60,22 +53,15 @@ def test_the_digest_is_of_the_content(tmp_path: Path, fitted: tuple[Predictor, P
 
 
 @pytest.mark.parametrize("content", [b"", b"hello", b"PK\x03\x04 not really", b"\x93NUMPY\x01\x00"])
-def test_a_file_that_is_no_predictor(tmp_path: Path, content: bytes) -> None:
-    path = tmp_path / "x.npz"
+def test_a_file_that_is_no_predictor(tmp_path: Path, content: bytes, stored: Path) -> None:
+    path, whole = tmp_path / "x.npz", stored.read_bytes()
     path.write_bytes(content)
+    stored.write_bytes(whole[: int(0.95 * len(whole))])
     np.savez(tmp_path / "y.npz", A=np.eye(3))
     np.savez(tmp_path / "z.npz", G=np.eye(3), document=np.array("[1, 2]"))
-    for wrong in (path, tmp_path, tmp_path / "y.npz", tmp_path / "z.npz"):
+    for wrong in (path, stored, tmp_path, tmp_path / "y.npz", tmp_path / "z.npz"):
         with pytest.raises(PredictorError, match=WRONG):
             read(wrong)
-
-
-@pytest.mark.parametrize("kept", [0.1, 0.95, 0.999])
-def test_a_truncated_file(stored: Path, kept: float) -> None:
-    content = stored.read_bytes()
-    stored.write_bytes(content[: int(kept * len(content))])
-    with pytest.raises(PredictorError, match="truncated or not a predictor"):
-        read(stored)
 
 
 @pytest.mark.parametrize(
