@@ -98,48 +98,6 @@ def test_torques_keep_to_bounds_that_differ_up_and_down() -> None:
     assert active > 10, "most of these ask for more than a motor has"
 
 
-@pytest.mark.parametrize(
-    ("acc", "contact", "active"),
-    [
-        ([0.0, 0.0, 40.0, 0.0, 0.0, 0.0], TROT, "torque"),
-        ([0.0, 0.0, 80.0, 0.0, 0.0, 0.0], ALL, "torque"),
-        ([15.0, 0.0, 0.0, 0.0, 0.0, 0.0], ALL, "friction"),
-        ([0.0, -15.0, 0.0, 0.0, 0.0, 0.0], TROT, "friction"),
-        ([0.0, 0.0, -15.0, 0.0, 0.0, 0.0], ALL, "least force"),
-    ],
-)
-def test_active_limits_are_those_of_the_full_problem(
-    acc: list[float], contact: Array, active: str
-) -> None:
-    pose = asked(standing_pose(0.7), contact, np.array(acc))
-    solution = solution_of(pose)
-    assert solution.status == "constrained"
-    check_limits(solution)
-    force = solution.force[contact > 0.5]
-    bound = WEIGHTS.mu / np.sqrt(2) * force[:, 2]
-    at_limit = {
-        "torque": np.abs(solution.tau).max() > TORQUE_LIMIT - 1e-6,
-        "friction": (np.abs(force[:, :2]).max(axis=1) > bound - 1e-6).any(),
-        "least force": force[:, 2].min() < WEIGHTS.force_min + 1e-6,
-    }
-    assert at_limit[active]
-    tau, full_force, _ = solve_full(pose, WEIGHTS)
-    np.testing.assert_allclose(solution.tau, tau, atol=1e-5)
-    np.testing.assert_allclose(force.ravel(), full_force, atol=1e-4)
-
-
-def test_what_cannot_be_had_together_is_weighed_by_the_length() -> None:
-    """Two feet cannot turn the trunk about the line between them: what is given up for it?"""
-    across = A1.feet_under_hips[0] / np.linalg.norm(A1.feet_under_hips[0])
-    acc = np.array([0.0, 0.0, 5.0, *(100.0 * across), 0.0])
-    plain, by_length = (
-        solution_of(asked(standing_pose(), TROT, acc), weights).defect
-        for weights in (WEIGHTS, gains_of(**PLAIN | {"tilt_length": 0.15}))
-    )
-    assert np.linalg.norm(by_length[:3]) < 0.9 * np.linalg.norm(plain[:3])
-    assert np.linalg.norm(by_length[3:6]) > np.linalg.norm(plain[3:6])
-
-
 @given(st.integers(0, 2**31), st.sampled_from(STANCES), st.floats(0.1, 50.0))
 @settings(deadline=None, max_examples=60)
 def test_every_answer_is_optimal(seed: int, contact: Array, size: float) -> None:
