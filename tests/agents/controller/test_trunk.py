@@ -71,8 +71,7 @@ def test_force_deviations_accelerate_a_rigid_body_as_newton_and_euler_say(seed: 
 
 
 def test_deviations_accelerate_only_when_they_are_to_be_fed_forward() -> None:
-    up = np.tile([0.0, 0.0, 5.0], 4)
-    plain = trunk(standing_pose())
+    up, plain = np.tile([0.0, 0.0, 5.0], 4), trunk(standing_pose())
     np.testing.assert_allclose(plain, 0.0, atol=1e-9)
     np.testing.assert_array_equal(trunk(standing_pose(), deviation=up), plain)
     fed = trunk(standing_pose(), deviation=up, feedforward=1.0) - plain
@@ -197,18 +196,17 @@ def stand(state: Any, seconds: float, rate: float) -> float:
     return angle
 
 
-def test_for_a_short_stand_the_heading_is_the_imus() -> None:
+@pytest.mark.parametrize("rate", [-0.05, 0.002, 0.3])
+def test_after_a_short_stand_the_heading_turns_with_the_feet_a_time_constant_behind(
+    rate: float,
+) -> None:
     state = standing_pose(0.3)
-    stand(state, SETTLED_S - 0.01, 0.1)
+    stand(state, SETTLED_S - 0.01, rate)
     state.contact[2] = 0.0  # a foot in the air begins the stand anew
     keep_heading(state)
     state.contact[2] = 1.0
-    stand(state, SETTLED_S - 0.01, 0.1)
+    stand(state, SETTLED_S - 0.01, rate)
     assert state.yaw_des == 0.3
-
-
-@pytest.mark.parametrize("rate", [-0.05, 0.002, 0.3])
-def test_then_it_turns_with_the_feet_a_time_constant_behind(rate: float) -> None:
     state = standing_pose(0.3)
     stand(state, SETTLED_S, rate)
     angle = stand(state, 20.0, rate) - rate * SETTLED_S  # the first stand turns the frame back
