@@ -292,7 +292,7 @@ class Agent:
         begun = tick - SAMPLE_MS
         if tick % SAMPLE_MS or begun < 0 or begun > state.tick:
             return None
-        stance = self._gait.at(begun, state.mode).stance
+        stance = self._gait.at(begun, state.mode)[:4]
         return Measurement(tick, tick * 1_000_000, robot.mean_planned_force, robot.outputs, stance)
 
     def _trunk_command(
