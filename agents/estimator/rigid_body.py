@@ -380,9 +380,8 @@ def rigid_body_terms(q: Array, v: Array, links: Array) -> RigidBodyTerms:
     axes = (x, y, z)
     motion = to_world(axes, position, velocity)
     for k in range(3):
-        axis = axes[k]
-        _set_columns(J, dJ, k, (axis, _ZERO), motion)
-        _set_columns(J, dJ, 3 + k, (vector_product(position, axis), axis), motion)
+        _set_columns(J, dJ, k, (axes[k], _ZERO), motion)
+        _set_columns(J, dJ, 3 + k, (vector_product(position, axes[k]), axes[k]), motion)
     # Gravity is an acceleration of the whole frame upwards.
     gravity = ((GRAVITY * R[2, 0], GRAVITY * R[2, 1], GRAVITY * R[2, 2]), _ZERO)
     whole = link_inertia(links[0], _TRUNK, _ZERO)
@@ -423,9 +422,8 @@ def _eliminate(
     xx, xy, xz, yy, yz, zz = state.mass
     p, q, r = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy
     d = 1.0 / (xx * p + xy * q + xz * r)
-    xy_, xz_, yz_ = d * q, d * r, d * (xy * xz - xx * yz)
-    yy_, zz_ = d * (xx * zz - xz * xz), d * (xx * yy - xy * xy)
-    D_inverse = np.array([[d * p, xy_, xz_], [xy_, yy_, yz_], [xz_, yz_, zz_]])
+    s, yy_, zz_ = xy * xz - xx * yz, xx * zz - xz * xz, xx * yy - xy * xy
+    D_inverse = d * np.array([[p, q, r], [q, yy_, s], [r, s, zz_]])
     F = np.empty((6, 3))
     for joint in range(3):
         for i in range(3):
