@@ -122,8 +122,8 @@ def test_north_is_nowhere(seed: int, yaw: float) -> None:
     here = random_pose(random)
     here.yaw_des = np.arctan2(here.R[1, 0], here.R[0, 0]) + random.uniform(-0.2, 0.2)
     here.height_integral, here.speed_integral = 0.01, random.normal(size=2) * 0.05
-    there, fields = here.copy(), {"wz": 0.2, "feedforward": 1.0}
-    fields["vx"], fields["vy"] = random.normal(size=2)
+    there, (vx, vy) = here.copy(), random.normal(size=2)
+    fields: dict[str, Any] = {"vx": vx, "vy": vy, "wz": 0.2, "feedforward": 1.0}
     there.position, there.velocity = Z @ here.position, Z @ here.velocity
     there.R, there.p_foot, there.yaw_des = Z @ here.R, here.p_foot @ Z.T, here.yaw_des + yaw
     fields["deviation"] = random.normal(size=12) * 10.0

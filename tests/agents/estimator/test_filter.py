@@ -211,9 +211,9 @@ def test_the_truth_is_taken_over_as_it_is_and_the_filter_goes_on_from_it(seed: i
     v[:] = random.uniform(-1.0, 1.0, 18)
     expected, sensors = pose_of(q, v), sensed(q, v)
     mine = (expected.position, expected.quat_wxyz, expected.velocity, expected.R @ expected.omega)
-    trunks = [np.stack([np.eye(1, len(part))[0], part]) for part in mine]
+    p, quat, v_trunk, omega = (np.stack([np.eye(1, len(part))[0], part]) for part in mine)
     loads, none = np.zeros((2, 4, 3)), np.zeros(1)
-    truth = Truth(0, 0, ("r1", "r2"), *trunks, loads, none, none)
+    truth = Truth(0, 0, ("r1", "r2"), p, quat, v_trunk, omega, loads, none, none)
     gains, walking = gains_row(Config()), np.array([0.0, 0.0, 0.0, 0.0, 0.5, 0.0])
     tilted = sensors.imu_quat_wxyz + np.array([0.0, 0.05, -0.02, 0.1])
     read = replace(sensors, imu_quat_wxyz=tilted)
