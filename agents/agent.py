@@ -18,7 +18,7 @@ from quadriga.agents.controller.whole_body_qp import WholeBodySolution
 from quadriga.agents.counters import count
 from quadriga.agents.estimator.estimator import estimate, truth_row
 from quadriga.agents.estimator.robot_state import RobotState, gains_row
-from quadriga.agents.gait import Gait, Schedule
+from quadriga.agents.gait import Gait
 from quadriga.agents.modes import ModeRules, ResumeState, Statuses, newest_statuses, ramp
 from quadriga.agents.planner.solver import SolvedQp
 from quadriga.agents.planner.team import Collected
@@ -270,7 +270,7 @@ class Agent:
         return new, outputs
 
     def _estimate(
-        self, state: AgentState, inputs: Inputs, schedule: Schedule, dt: float
+        self, state: AgentState, inputs: Inputs, schedule: Array, dt: float
     ) -> RobotState:
         truth, known = inputs.truth, None
         # One that is lost or late is bridged by the filter.
@@ -292,7 +292,7 @@ class Agent:
         begun = tick - SAMPLE_MS
         if tick % SAMPLE_MS or begun < 0 or begun > state.tick:
             return None
-        stance = self._gait.at(begun, state.mode).stance
+        stance = self._gait.at(begun, state.mode)[:4]
         return Measurement(tick, tick * 1_000_000, robot.mean_planned_force, robot.outputs, stance)
 
     def _trunk_command(

@@ -5,7 +5,6 @@ Which feet are scheduled to stand when, and where samples, planning steps and th
 
 from __future__ import annotations
 
-from dataclasses import field
 from functools import lru_cache
 from math import lcm
 
@@ -15,12 +14,14 @@ from numpy.typing import NDArray
 from quadriga.shared.config.sections import Config
 from quadriga.shared.modes import STOPPING, WALK, Mode
 from quadriga.shared.robots.conventions import N_LEGS, Array
-from quadriga.shared.runtime.record import record
 from quadriga.shared.topics import SAMPLE_MS
 
 # Diagonal pairs in the leg order FL FR RL RR: row 0 stands in the first half cycle.
 _BITS = np.array([8, 4, 2, 1])
 _PAIRS = np.array([[True, False, False, True], [False, True, True, False]])
+# Rows of a gait: scheduled stance of the four legs, 1 or 0; progress of the half cycle in [0, 1);
+# its number, 0 or 1, and −1 of a robot that stands on four feet.
+STANDING = np.array([1.0, 1.0, 1.0, 1.0, 0.5, -1.0])
 
 
 def phase_offset_ms(config: Config, index: int) -> int:
@@ -33,21 +34,6 @@ def scheduled_stance(config: Config, index: int, ticks: NDArray[np.int64]) -> ND
     since = ticks - config.gait.stand_ms
     half_cycle = ((since + phase_offset_ms(config, index)) // config.gait.stance_ms) % 2
     return np.where((since < 0)[:, None], True, _PAIRS[half_cycle])
-
-
-def stance_progress(config: Config, index: int, tick: int) -> tuple[float, int]:
-    """Progress of the present half cycle in [0, 1) and its number, 0 or 1.
-
-    Both half cycles last `stance_ms`: one diagonal pair stands while the other swings.
-    """
-    since = tick - config.gait.stand_ms + phase_offset_ms(config, index)
-    half_cycle, within = divmod(since, config.gait.stance_ms)
-    return within / config.gait.stance_ms, half_cycle % 2
-
-
-def half_cycle_stance(half_cycle: int) -> NDArray[np.bool_]:
-    """Scheduled stance during a half cycle; number −1 stands on all four legs. Shape (4,)."""
-    return np.ones(N_LEGS, dtype=np.bool_) if half_cycle < 0 else _PAIRS[half_cycle]
 
 
 def nominal_forces(stance: NDArray[np.bool_], weight: float) -> Array:
@@ -79,31 +65,8 @@ def nominal_table(weight: float) -> Array:
     return table
 
 
-@record
-class Schedule:
-    """The gait at one tick.
-
-    Attributes:
-        stance: scheduled stance, (4,), 1 or 0.
-        progress: progress of the half cycle in [0, 1).
-        half_cycle: its number; −1: the robot stands on four feet.
-        row: all of it, (6,).
-    """
-
-    stance: Array
-    progress: float
-    half_cycle: int
-    row: Array = field(init=False, repr=False, compare=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "row", np.array([*self.stance, self.progress, self.half_cycle]))
-
-
-_STANDING = Schedule(half_cycle_stance(-1).astype(float), 0.5, -1)
-
-
 class Gait:
-    """Fixed data of one robot's gait, looked up at each tick.
+    """One robot's gait, looked up at each tick.
 
     Args:
         config: the team's configuration.
@@ -111,18 +74,18 @@ class Gait:
     """
 
     def __init__(self, config: Config, index: int) -> None:
-        self._stand_ms = config.gait.stand_ms
-        stances = [half_cycle_stance(half_cycle).astype(float) for half_cycle in (0, 1)]
-        self._cycle: list[Schedule] = []  # from the end of the stand on
-        for since in range(2 * config.gait.stance_ms):
-            progress, half_cycle = stance_progress(config, index, self._stand_ms + since)
-            self._cycle.append(Schedule(stances[half_cycle], progress, half_cycle))
+        stance_ms, self._stand_ms = config.gait.stance_ms, config.gait.stand_ms
+        since = np.arange(2 * stance_ms)  # the end of the stand
+        half_cycle, within = np.divmod(since + phase_offset_ms(config, index), stance_ms)
+        half_cycle %= 2
+        self._cycle = np.column_stack([_PAIRS[half_cycle], within / stance_ms, half_cycle])
 
-    def at(self, tick: int, mode: Mode) -> Schedule:
-        """The gait at `tick`; in modes without a trot all four legs stand."""
+    def at(self, tick: int, mode: Mode) -> Array:
+        """The gait at `tick`, see `STANDING`; in modes without a trot all four legs stand."""
         if mode.name not in (WALK, STOPPING):
-            return _STANDING
-        return self._cycle[(tick - self._stand_ms) % len(self._cycle)]
+            return STANDING
+        row: Array = self._cycle[(tick - self._stand_ms) % len(self._cycle)]
+        return row
 
 
 def step_ms(config: Config) -> int:

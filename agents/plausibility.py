@@ -37,14 +37,9 @@ _REFERENCE_LIMITS: Final = {
 }
 
 
-def force_max(robot: RobotSpec) -> float:
-    """Greatest component of a foot's force that such a robot can mean, N."""
-    return _FORCE_MAX * robot.weight
-
-
 def is_plausible(config: Config, u: Array, y: Array) -> bool:
     """Whether forces u, (…, 12), N, and outputs y, (…, 6), are numbers that a robot can mean."""
-    most = force_max(config.robot) + max(config.planner.deviation_max)
+    most = _FORCE_MAX * config.robot.weight + max(config.planner.deviation_max)
     return _largest(u) <= most and are_plausible_outputs(y)
 
 

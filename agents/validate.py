@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from quadriga.agents.estimator.leg_dynamics import foot_forces
+from quadriga.agents.estimator.rigid_body import foot_forces
 from quadriga.shared.codes import with_detail
 from quadriga.shared.config.sections import Config
 from quadriga.shared.messages import Command, State, cuts_of

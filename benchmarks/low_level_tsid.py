@@ -20,8 +20,8 @@ import numpy as np
 from benchmarks.children import result_of
 from benchmarks.low_level_ticks import AgentTick, TsidCase
 from quadriga.agents.agent import Agent
-from quadriga.agents.controller.rigid_body import rigid_body_terms
 from quadriga.agents.controller.whole_body_qp import QP, WholeBodySolution, build_qp, solve_qp
+from quadriga.agents.estimator.rigid_body import rigid_body_terms
 from quadriga.agents.estimator.robot_state import GAINS, ROBOT_STATE, gains_row
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config

@@ -12,7 +12,6 @@ from typing import Final
 
 import numpy as np
 
-from quadriga.agents.controller.rigid_body import rigid_body_terms
 from quadriga.agents.controller.swing import foot_velocities, stance_forces, swing_accelerations
 from quadriga.agents.controller.trunk import (
     COMMAND,
@@ -28,13 +27,13 @@ from quadriga.agents.controller.whole_body_qp import (
     torque_bounds,
 )
 from quadriga.agents.estimator.payload_friction import add_payload, update_mu_reduction
+from quadriga.agents.estimator.rigid_body import rigid_body_terms
 from quadriga.agents.estimator.robot_state import GAINS, ROBOT_STATE, RobotState
 from quadriga.shared.robots.conventions import N_FORCES, Array
 from quadriga.shared.robots.torque_speed import MotorCurves
 from quadriga.shared.runtime.jit import compiled
 
-# The numbers of `COMMAND` behind the deviation: v, wz, height, feedforward, tilt, new_sample.
-_NUMBERS: Final = struct.Struct(f"={COMMAND.itemsize // 8 - N_FORCES}d")
+_NUMBERS: Final = struct.Struct(f"={COMMAND.itemsize // 8 - N_FORCES}d")  # behind the deviation
 
 
 def control(
@@ -52,11 +51,9 @@ def control(
         The state to remember, with what the QP was asked for, and the QP with its answer.
     """
     asked, row = np.empty(COMMAND.itemsize // 8), np.empty(len(state.row))
-    asked[:N_FORCES] = command.deviation
+    vx, vy, wz, height, asked[:N_FORCES], *rest = command
     # At once: each number that numpy is given by itself costs as much as this.
-    numbers = command.vx, command.vy, command.wz, command.height, command.feedforward
-    tilt = command.roll, command.pitch
-    _NUMBERS.pack_into(asked, 8 * N_FORCES, *numbers, *tilt, new_sample)  # type: ignore[arg-type]
+    _NUMBERS.pack_into(asked, 8 * N_FORCES, vx, vy, wz, height, *rest, new_sample)  # type: ignore[arg-type]
     qp = np.empty(QP.itemsize // 8)
     free = _control(state.row, row, asked, gains, qp)
     return RobotState(row), solve_qp(qp, free)

@@ -12,20 +12,16 @@ from quadriga.shared.runtime.jit import compiled
 
 _SHORTEST: Final = 0.1  # m, how near to the hip a foot is lifted
 _CLEARANCE: Final = 0.03  # m, how far a foot that was stopped still rises
-_BACK: Final = 0.3  # of the speed at which a foot retracts upwards: away from what stopped it
+_RETRACTION_SPEED: Final = 1.0  # m/s, upwards, of a foot that was stopped
+_BACK: Final = 0.3  # of that speed: away from what stopped it
+_ACCELERATION: Final = 100.0  # m/s², the most that the way of a late swing may need
 _PLANE_DONE: Final = 0.9  # of swing: the foot comes down vertically
 _PENETRATION: Final = 0.005  # m below the expected ground, so that touchdown is sure
 
 
 @compiled
 def foot_velocities(J: Array, v: Array, p_foot: Array) -> Array:
-    """Velocities of the foot centres, (4, 3), m/s, odometry frame.
-
-    Args:
-        J: spatial Jacobians, see `RigidBodyTerms`, (6, 18).
-        v: generalised velocity, (18,).
-        p_foot: foot centres, (4, 3), m, odometry frame.
-    """
+    """Velocities of the foot centres, (4, 3), m/s, odometry frame, by `RigidBodyTerms.J`."""
     out = np.empty((4, 3))
     for leg in range(4):
         twist = np.zeros(6)
@@ -44,10 +40,7 @@ def foot_velocities(J: Array, v: Array, p_foot: Array) -> Array:
 def stance_forces(state: np.record, gains: np.record, deviation: Array) -> Array:
     """Nominal weight on the feet in contact plus the planned deviation, (4, 3), N, odometry frame.
 
-    Args:
-        state: `ROBOT_STATE`.
-        gains: `GAINS`.
-        deviation: planned, from the nominal forces, (12,), N, yaw frame.
+    `deviation` is that from the nominal forces, (12,), N, yaw frame.
     """
     mass, count = gains.body_mass + state.payload, max(1.0, np.sum(state.contact))
     c, s = heading(state.R)
@@ -65,12 +58,7 @@ def stance_forces(state: np.record, gains: np.record, deviation: Array) -> Array
 def swing_accelerations(state: np.record, wz: float, gains: np.record) -> Array:
     """Desired accelerations of the feet not in contact, (4, 3), m/s², odometry frame.
 
-    ẍ_des = ẍ_ref + kp (x_ref − x) + kd (ẋ_ref − ẋ)
-
-    Args:
-        state: `ROBOT_STATE`; `swing_start`, `foot_goal` and `reaction` change.
-        wz: desired yaw rate, rad/s.
-        gains: `GAINS`.
+    ẍ_des = ẍ_ref + kp (x_ref − x) + kd (ẋ_ref − ẋ); the desired yaw rate is `wz`, rad/s.
     """
     update_anchors(state, gains)
     out = np.zeros((4, 3))
@@ -85,7 +73,12 @@ def swing_accelerations(state: np.record, wz: float, gains: np.record) -> Array:
             reference[1, 2] = -gains.descent_speed
         elif state.retraction[leg] > 0.0:
             reference[0] = position
-            reference[1] = _retraction_velocity(state.reaction[leg], gains.retraction_speed)
+            # Up, and back from what stopped it.
+            reaction, reference[1, 2] = state.reaction[leg], _RETRACTION_SPEED
+            plane = np.sqrt(reaction[0] ** 2 + reaction[1] ** 2)
+            if plane > 1e-6:
+                reference[1, 0] = _BACK * _RETRACTION_SPEED * reaction[0] / plane
+                reference[1, 1] = _BACK * _RETRACTION_SPEED * reaction[1] / plane
         else:
             reference = _swing(state, wz, gains, leg)
         correction = gains.kp_swing * (reference[0] - position)
@@ -124,17 +117,6 @@ def update_anchors(state: np.record, gains: np.record) -> None:
 
 
 @compiled
-def _retraction_velocity(reaction: Array, speed: float) -> Array:
-    """Velocity of a foot that was stopped: up, and back from what stopped it in the plane. (3,)."""
-    out = np.array([0.0, 0.0, speed])
-    plane = np.sqrt(reaction[0] ** 2 + reaction[1] ** 2)
-    if plane > 1e-6:
-        out[0] = _BACK * speed * reaction[0] / plane
-        out[1] = _BACK * speed * reaction[1] / plane
-    return out
-
-
-@compiled
 def _swing(state: np.record, wz: float, gains: np.record, leg: int) -> Array:
     """Reference of a swing foot, see `swing_reference`."""
     expected, count = 0.0, 0.0  # the ground at a foothold: the mean under the feet that stand
@@ -150,7 +132,7 @@ def _swing(state: np.record, wz: float, gains: np.record, leg: int) -> Array:
     apex = np.max(state.ground) + gains.swing_height
     if lift > 0.0:
         apex = max(apex, start[2] + _CLEARANCE)
-        limit_foothold(target, start, gains.swing_acceleration, duration, gains.swing_delay)
+        limit_foothold(target, start, _ACCELERATION, duration, gains.swing_delay)
     if gains.track_sinking_trunk > 0.5:
         apex = min(apex, max(state.position[2] - _SHORTEST, start[2]))
     ground, progress = expected + gains.foot_radius, (state.progress - lift) / share
@@ -164,12 +146,6 @@ def foothold(state: np.record, wz: float, gains: np.record, leg: int) -> Array:
     v is the trunk's velocity; the hip's own velocity from the yaw rate is added to it. It lies no
     farther than `foothold_inwards` (times 1 + payload / mass) towards the trunk's middle line from
     under its hip: a trunk that is thrown aside asks for footholds where other legs are.
-
-    Args:
-        state: `ROBOT_STATE`.
-        wz: desired yaw rate, rad/s.
-        gains: `GAINS`.
-        leg: which.
     """
     x = (1.0 if leg < 2 else -1.0) * gains.under_hip[0]
     outwards = 1.0 if leg % 2 == 0 else -1.0

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from quadriga.agents.estimator.kinematics import cross, heading, roll_pitch_yaw, wrap_angle
 from quadriga.shared.robots.conventions import GRAVITY, N_FORCES, N_LEGS, Array
 from quadriga.shared.runtime.jit import compiled
-from quadriga.shared.runtime.record import record
 
 SETTLED_S: Final = 2.0  # of standing, from which on the feet tell the heading
 FOLLOW_S: Final = 1.0  # time constant: encoders' noise stays out of the heading
@@ -19,27 +18,14 @@ DRIFT_KNOWN_S: Final = _FOLLOWS_S + 2.0  # of standing, from which on the mean i
 DRIFT_MOST: Final = math.radians(1.0)  # rad/s: feet that seem to turn faster do turn
 _Z_LIMIT: Final = 0.05  # m·s, height integrator
 _SPEED_LIMIT: Final = 0.15  # m, speed integrator
+# s, of the speed integrator's forgetting: yoked robots share one speed, and without a leak their
+# estimators' biases would wind the integrators up against each other.
+LEAK: Final = 6.0
+POSITION_LIMIT: Final = 0.05  # m, of the position reference's lead
 _YAW_LIMIT: Final = 0.3  # rad, of the heading error that is acted on
 
-# A `TrunkCommand` and what belongs to its tick, as compiled code takes them.
-COMMAND: Final = np.dtype(
-    (
-        np.record,
-        [
-            ("deviation", float, N_FORCES),
-            ("v", float, 2),
-            ("wz", float),
-            ("height", float),
-            ("feedforward", float),
-            ("tilt", float, 2),
-            ("new_sample", float),  # flag: a sample of forces begins with this tick
-        ],
-    )
-)
 
-
-@record
-class TrunkCommand:
+class TrunkCommand(NamedTuple):
     """What the robot is asked to do at one tick (yaw frame).
 
     Attributes:
@@ -63,23 +49,30 @@ class TrunkCommand:
     pitch: float = 0.0
 
 
+# The same as compiled code takes it; `new_sample`: a sample of forces begins with this tick.
+_NUMBERS: Final = [name for name in TrunkCommand._fields if name != "deviation"]
+COMMAND: Final = np.dtype(
+    (
+        np.record,
+        [("deviation", float, N_FORCES), *((name, float) for name in (*_NUMBERS, "new_sample"))],
+    )
+)
+
+
 @compiled
 def trunk_reference(
     state: np.record, command: np.record, gains: np.record, deviation: Array
 ) -> Array:
     """Desired acceleration of the trunk, (6,), m/s² and rad/s², odometry frame.
 
-    Args:
-        state: `ROBOT_STATE`; integrators and the desired heading go on.
-        command: `COMMAND`.
-        gains: `GAINS`.
-        deviation: see `accumulate_forces`.
+    Integrators and the desired heading go on. `command` is a `COMMAND`, `deviation` that of
+    `accumulate_forces`.
     """
     keep_heading(state)
     acc = trunk_feedback(state, command, gains)
     if command.feedforward > 0.5:
         acc += feedforward(state, gains, deviation)
-    if gains.free_fall_reference > 0.5 and np.sum(state.contact) < 0.5:
+    if gains.flight > 0.5 and np.sum(state.contact) < 0.5:
         # A robot in the air cannot have anything else; asked for more, the QP throws its legs about
         # to move the trunk a little, and the feet are not where the ground will be.
         acc[:] = 0.0
@@ -149,17 +142,18 @@ def trunk_feedback(state: np.record, command: np.record, gains: np.record) -> Ar
     state.height_integral = min(_Z_LIMIT, max(-_Z_LIMIT, state.height_integral + dt * z_error))
     acc[2] = gains.kp_z * z_error - gains.kd_z * velocity[2] + gains.ki_z * state.height_integral
 
-    vx, vy = command.v
+    vx, vy = command.vx, command.vy
     state.v_des[0], state.v_des[1] = c * vx - s * vy, s * vx + c * vy
-    error = command.v - np.array(
-        [c * velocity[0] + s * velocity[1], -s * velocity[0] + c * velocity[1]]
+    error = np.array(
+        [vx - (c * velocity[0] + s * velocity[1]), vy - (-s * velocity[0] + c * velocity[1])]
     )
     integral, position = state.speed_integral, state.position_error
-    limit = gains.position_error_limit
     for axis in range(2):
-        remaining = (1.0 - dt / gains.leak_xy) * integral[axis]
+        remaining = (1.0 - dt / LEAK) * integral[axis]
         integral[axis] = min(_SPEED_LIMIT, max(-_SPEED_LIMIT, remaining + dt * error[axis]))
-        position[axis] = min(limit, max(-limit, position[axis] + dt * error[axis]))
+        position[axis] = min(
+            POSITION_LIMIT, max(-POSITION_LIMIT, position[axis] + dt * error[axis])
+        )
         in_plane[axis] = (
             gains.kd_xy * error[axis] + gains.ki_xy * integral[axis] + gains.kp_xy * position[axis]
         )
@@ -172,10 +166,8 @@ def trunk_feedback(state: np.record, command: np.record, gains: np.record) -> Ar
     acc[5] = gains.kp_yaw * yaw_error + gains.kd_yaw * (command.wz - omega[2])
 
     # Tilt errors about the horizontal axes of the yaw frame, taken to the odometry frame.
-    roll = gains.kp_tilt * (command.tilt[0] - rpy[0]) - gains.kd_tilt * (
-        c * omega[0] + s * omega[1]
-    )
-    pitch = gains.kp_tilt * (command.tilt[1] - rpy[1]) - gains.kd_tilt * (
+    roll = gains.kp_tilt * (command.roll - rpy[0]) - gains.kd_tilt * (c * omega[0] + s * omega[1])
+    pitch = gains.kp_tilt * (command.pitch - rpy[1]) - gains.kd_tilt * (
         -s * omega[0] + c * omega[1]
     )
     acc[3], acc[4] = c * roll - s * pitch, s * roll + c * pitch
@@ -188,11 +180,6 @@ def feedforward(state: np.record, gains: np.record, deviation: Array) -> Array:
 
     Schedule, not contact, decides which legs count: a contact that comes early or late must
     not put a jump into the feed-forward.
-
-    Args:
-        state: `ROBOT_STATE`.
-        gains: `GAINS`.
-        deviation: planned, from the nominal forces, (12,), N, yaw frame.
 
     Returns:
         Linear and angular acceleration, m/s² and rad/s², odometry frame.

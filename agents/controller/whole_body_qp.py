@@ -20,7 +20,8 @@ from typing import Final
 import daqp
 import numpy as np
 
-from quadriga.agents.controller.rigid_body import (
+from quadriga.agents.estimator.kinematics import cross
+from quadriga.agents.estimator.rigid_body import (
     RigidBodyTerms,
     add_gram,
     cholesky,
@@ -29,9 +30,7 @@ from quadriga.agents.controller.rigid_body import (
     product,
     symmetrise,
     times,
-    transposed_times,
 )
-from quadriga.agents.estimator.kinematics import cross
 from quadriga.agents.estimator.robot_state import RecordRow, cuts_of_record
 from quadriga.shared.codes import with_detail
 from quadriga.shared.robots.conventions import N_FORCES, N_JOINTS, N_LEGS, Array
@@ -137,12 +136,7 @@ def recover_forces(row: Array, tau: Array) -> None:
 
 @compiled
 def torque_bounds(rates: Array, curves: MotorCurves) -> Array:
-    """Least and greatest torque of each motor, (2, 12), N·m: what it has at its present rate.
-
-    Args:
-        rates: joint rates, (12,), rad/s.
-        curves: of the motors.
-    """
+    """Least and greatest torque of motors, (2, 12), N·m, at their joints' rates, (12,), rad/s."""
     bounds = np.empty((2, 12))
     for k in range(12):
         least = _LEAST_TORQUE * curves.peak[k]
@@ -159,8 +153,8 @@ def build_qp(
 
     Args:
         terms: of the rigid body.
-        state: `ROBOT_STATE`; asked for are `acc_des`, `swing_acc_des` and `force_des`.
-        gains: `GAINS`.
+        state: asked for are `acc_des`, `swing_acc_des` and `force_des`.
+        gains: weights, friction, least force.
         bounds: τ_min and τ_max of each motor, (2, 12), N·m.
         row: of `QP`, filled; NaN where no slip cannot be had.
 
@@ -169,13 +163,20 @@ def build_qp(
     """
     qp = row.view(QP)[0]
     qp.contact[:] = state.contact
-    J, drift = _foot_jacobians(terms, state.p_foot)
+    J, drift = _foot_jacobians(terms, state.v, state.p_foot)
     stands = np.repeat(state.contact > 0.5, 3)
     on, off = np.flatnonzero(stands), np.flatnonzero(~stands)
+    forces, rows = len(on), 6 + len(off)
     affine, acceleration = _resolve_contacts(terms, J[on], drift[on])
-    swing = drift[off] - state.swing_acc_des.ravel()[off]
-    outputs = _output_dynamics(terms.v, state, acceleration, J[off], swing)
-    forces, rows = len(affine), len(outputs)
+
+    # The outputs' accelerations of each torque, and of none less the desired ones, (B, b₀ − a_des).
+    R, omega, outputs = state.R, state.v[3:6], np.empty((rows, 13))
+    outputs[:3], outputs[3:6] = product(R, acceleration[:3]), product(R, acceleration[3:6])
+    outputs[6:] = product(J[off], acceleration)
+    outputs[:3, 12] += times(R, cross(omega, state.v[:3])) - state.acc_des[:3]
+    outputs[3:6, 12] -= state.acc_des[3:]
+    outputs[6:, 12] += drift[off] - state.swing_acc_des.ravel()[off]
+
     qp.A[:forces], qp.a0[:forces] = affine[:, :12], affine[:, 12]
     qp.B[:rows], qp.defect0[:rows] = outputs[:, :12], outputs[:, 12]
     qp.lower[:12], qp.upper[:12], qp.upper[12:] = bounds[0], bounds[1], _UNBOUNDED
@@ -195,9 +196,9 @@ def build_qp(
 
 
 @compiled
-def _foot_jacobians(terms: RigidBodyTerms, p_foot: Array) -> tuple[Array, Array]:
+def _foot_jacobians(terms: RigidBodyTerms, v: Array, p_foot: Array) -> tuple[Array, Array]:
     """Jacobian of the foot centres, (12, 18), and its drift J̇v, (12,), odometry frame."""
-    J, dJ, v = terms.J, terms.dJ, terms.v
+    J, dJ = terms.J, terms.dJ
     jacobian, drift = np.zeros((12, 18)), np.empty(12)
     for leg in range(4):
         p, row = p_foot[leg], 3 * leg
@@ -212,8 +213,7 @@ def _foot_jacobians(terms: RigidBodyTerms, p_foot: Array) -> tuple[Array, Array]
                 bias[i] += dJ[i, column] * v[column]
                 twist[i] += J[i, column] * v[column]
         velocity = twist[:3] + cross(twist[3:], p)
-        acceleration = bias[:3] + cross(bias[3:], p) + cross(twist[3:], velocity)
-        drift[row : row + 3] = acceleration
+        drift[row : row + 3] = bias[:3] + cross(bias[3:], p) + cross(twist[3:], velocity)
     return jacobian, drift
 
 
@@ -221,10 +221,8 @@ def _foot_jacobians(terms: RigidBodyTerms, p_foot: Array) -> tuple[Array, Array]
 def _resolve_contacts(terms: RigidBodyTerms, J_c: Array, drift: Array) -> tuple[Array, Array]:
     """Contact forces and accelerations as functions of the torques where the feet do not slip.
 
-    v̇ = M⁻¹ (S τ + J_cᵀ f − h) with J_c v̇ + J̇_c v = 0 gives f = A τ + a₀.
-
-    Returns:
-        (A, a₀), (3 n_c, 13), and v̇ of each torque and of none, (18, 13).
+    v̇ = M⁻¹ (S τ + J_cᵀ f − h) with J_c v̇ + J̇_c v = 0 gives f = A τ + a₀: (A, a₀), (3 n_c, 13), and
+    v̇ of each torque and of none, (18, 13).
     """
     M_inverse, n = terms.M_inverse, len(J_c)
     free = times(M_inverse, terms.nle)
@@ -249,37 +247,8 @@ def _resolve_contacts(terms: RigidBodyTerms, J_c: Array, drift: Array) -> tuple[
 
 
 @compiled
-def _output_dynamics(
-    v: Array, state: np.record, acceleration: Array, J_swing: Array, swing: Array
-) -> Array:
-    """The outputs' accelerations of each torque, and of none less the desired ones.
-
-    Args:
-        v: generalised velocity, (18,).
-        state: `ROBOT_STATE`.
-        acceleration: v̇ of each torque and of none, (18, 13).
-        J_swing: Jacobian of the feet not in contact, (12 − 3 n_c, 18).
-        swing: their drift J̇ v less the desired acceleration, (12 − 3 n_c,).
-
-    Returns:
-        (B, b₀ − a_des), (18 − 3 n_c, 13).
-    """
-    R, outputs = state.R, np.empty((6 + len(J_swing), 13))
-    outputs[:3] = product(R, acceleration[:3])
-    outputs[3:6] = product(R, acceleration[3:6])
-    outputs[6:] = product(J_swing, acceleration)
-    outputs[:3, 12] += times(R, cross(v[3:6], v[:3])) - state.acc_des[:3]
-    outputs[3:6, 12] -= state.acc_des[3:]
-    outputs[6:, 12] += swing
-    return outputs
-
-
-@compiled
 def _fill_cost(qp: np.record, outputs: Array, f_des: Array, gains: np.record) -> None:
-    """Fill H and g, scaled so that the mean of H's diagonal is one.
-
-    `outputs` are those of `_output_dynamics`; W is applied to them in place.
-    """
+    """Fill H and g, scaled so that the mean of H's diagonal is one; W is applied to `outputs`."""
     A, a0 = qp.A[: len(f_des)], qp.a0[: len(f_des)]
     H = np.zeros((12, 12))
     add_gram(gains.gamma_force, A, H)
@@ -292,8 +261,8 @@ def _fill_cost(qp: np.record, outputs: Array, f_des: Array, gains: np.record) ->
         H[k, k] += gains.gamma_tau
         trace += H[k, k]
     symmetrise(H)
-    g = gains.gamma_force * transposed_times(A, a0 - f_des)
-    g = g + gains.gamma_defect * transposed_times(W_B, W_b)
+    g = gains.gamma_force * times(A.T, a0 - f_des)
+    g = g + gains.gamma_defect * times(W_B.T, W_b)
     scale = 12.0 / trace
     qp.H[:], qp.g[:] = scale * H, scale * g
 

@@ -1,7 +1,7 @@
 """From scheduled stance and loaded feet to the contacts the QP may push on, and the ground height.
 
 With contact detection on, a swing foot that is loaded from below in the second half of swing
-becomes a stance foot early, and a stance foot without load for `lost_contact_ms` is taken out of
+becomes a stance foot early, and a stance foot without load for `_LOST` is taken out of
 the contact set and descends until it finds ground. A foot that is stopped from the side is no
 support, however loaded: it retracts, up and back from what stopped it (`controller.swing`).
 """
@@ -18,19 +18,15 @@ from quadriga.shared.runtime.jit import compiled
 _EARLIEST_TOUCHDOWN: Final = 0.5  # of swing: before this a load is the foot still leaving
 _EARLIEST_RETRACTION: Final = 0.12  # of swing, likewise
 _LATEST_RETRACTION: Final = 0.67  # of the half cycle: later, a new swing would be a kick
+_LOST: Final = 5e-3  # s, for which a foot is without load until it is no contact
+_GROUND_FILTER: Final = 0.05  # s, time constant of the ground height
 _BELOW: Final = 0.7  # share of the reaction that must point upwards for ground below the foot
 
 
 @compiled
 def update_contacts(state: np.record, gains: np.record) -> None:
-    """Update contacts and ground heights.
-
-    Args:
-        state: `ROBOT_STATE` with foot loads and places of this tick.
-        gains: `GAINS`.
-    """
-    ground_filter = 1e-3 * gains.ground_filter_ms
-    rate = state.dt / (ground_filter + state.dt)
+    """Update contacts and ground heights from the foot loads and places of this tick."""
+    rate = state.dt / (_GROUND_FILTER + state.dt)
     sole_z = state.p_foot[:, 2] - gains.foot_radius
     if gains.contact_detection < 0.5:
         _follow_schedule(state, sole_z, rate)
@@ -59,11 +55,7 @@ def _follow_schedule(state: np.record, sole_z: Array, rate: float) -> None:
 
 @compiled
 def is_from_below(reaction: Array) -> bool:
-    """Whether what stops a foot is under it and not beside it; true where nothing stops it.
-
-    Args:
-        reaction: of `ROBOT_STATE`, (3,), m/s².
-    """
+    """Whether what stops a foot, (3,), m/s², is under it and not beside it; true of nothing."""
     size = np.sqrt(reaction[0] ** 2 + reaction[1] ** 2 + reaction[2] ** 2)
     return bool(reaction[2] >= _BELOW * size)
 
@@ -78,7 +70,7 @@ def _update_stance(state: np.record, gains: np.record, leg: int) -> None:
         state.early_contact[leg] = state.unloaded[leg] = 0.0
     state.lift[leg] = state.retraction[leg] = 0.0
     state.unloaded[leg] = 0.0 if carries else state.unloaded[leg] + state.dt
-    lost = state.unloaded[leg] > 1e-3 * gains.lost_contact_ms
+    lost = state.unloaded[leg] > _LOST
     state.contact[leg] = 0.0 if lost else 1.0
 
 
@@ -98,12 +90,12 @@ def _update_swing(state: np.record, gains: np.record, leg: int) -> None:
     if state.early_contact[leg] > 0.5:
         if rejects:
             state.unloaded[leg] = 0.0 if loaded else state.unloaded[leg] + state.dt
-        lost = state.unloaded[leg] > 1e-3 * gains.lost_contact_ms
+        lost = state.unloaded[leg] > _LOST
         state.contact[leg] = 0.0 if lost else 1.0
-    elif gains.retraction_ms > 0.0:
+    elif gains.reflex_ms > 0.0:
         in_time = swung > _EARLIEST_RETRACTION and state.progress < _LATEST_RETRACTION
         if loaded and not below and in_time:
-            state.retraction[leg] = 1e-3 * gains.retraction_ms
+            state.retraction[leg] = 1e-3 * gains.reflex_ms
         elif state.retraction[leg] > 0.0:
             state.retraction[leg] -= state.dt
             if state.retraction[leg] <= 0.0:  # the swing begins anew

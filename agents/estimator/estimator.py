@@ -20,7 +20,6 @@ from quadriga.agents.estimator.foot_load import forget_foot_load, update_foot_lo
 from quadriga.agents.estimator.kinematics import leg_kinematics, roll_pitch_yaw, rotation_matrix
 from quadriga.agents.estimator.payload_friction import update_payload
 from quadriga.agents.estimator.robot_state import GAINS, ROBOT_STATE, RobotState
-from quadriga.agents.gait import Schedule
 from quadriga.shared.messages import State, Truth
 from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.jit import compiled
@@ -28,12 +27,13 @@ from quadriga.shared.runtime.jit import compiled
 _Q_JOINT, _V_JOINT, _TAU_JOINT = (State.CUTS[k] for k in ("q_joint", "v_joint", "tau_joint"))
 _QUAT, _GYRO, _ACCEL = (State.CUTS[k] for k in ("imu_quat_wxyz", "imu_gyro", "imu_accel"))
 _FOOT_FORCE = State.CUTS["foot_force"]
+_ESTIMATED = np.empty(0)  # for the truth that is not known
 
 
 def estimate(
     before: RobotState | None,
     sensors: State,
-    schedule: Schedule,
+    schedule: Array,
     dt: float,
     gains: Array,
     truth: Array | None = None,
@@ -43,17 +43,14 @@ def estimate(
     Args:
         before: at the last tick, after `control`; None: it stands still at the origin.
         sensors: what it measures.
-        schedule: the gait.
+        schedule: a row of `Gait`.
         dt: time since the last tick, s.
         gains: `gains_row`.
         truth: `truth_row`, to take for the filter's estimate, for comparison with it.
     """
     row = np.empty(ROBOT_STATE.itemsize // 8)
     row0 = standing_state(sensors, gains).row if before is None else before.row
-    if truth is None:
-        _estimate(row0, row, sensors.row, schedule.row, dt, gains)
-    else:
-        _estimate_by_truth(row0, row, sensors.row, schedule.row, dt, gains, truth)
+    _estimate(row0, row, sensors.row, schedule, dt, gains, _ESTIMATED if truth is None else truth)
     if before is None:  # feet are anchored where they are, the heading is kept
         state = row.view(ROBOT_STATE)[0]
         state.swing_start = state.foot_goal = state.p_foot
@@ -84,21 +81,6 @@ def truth_row(truth: Truth, robot: str) -> Array:
 
 @compiled
 def _estimate(
-    before: Array, after: Array, readings: Array, schedule: Array, dt: float, gains_row: Array
-) -> None:
-    """Fill the row `after` from the row `before`, `State.row` and `Schedule.row`."""
-    after[:] = before
-    state, gains = after.view(ROBOT_STATE)[0], gains_row.view(GAINS)[0]
-    _read(state, readings, schedule, dt)
-    take_imu_error_off(state)
-    update_foot_load(state, gains)
-    correction = filter_step(state, gains, foot_trust(state, gains))
-    update_imu_error(state, correction, gains.tilt_time)
-    _complete(state, gains)
-
-
-@compiled
-def _estimate_by_truth(
     before: Array,
     after: Array,
     readings: Array,
@@ -107,32 +89,9 @@ def _estimate_by_truth(
     gains_row: Array,
     truth: Array,
 ) -> None:
-    """The same, of a robot that knows where it is; its filter goes on from there."""
+    """Fill the row `after` from the row `before`, `State.row`, a row of `Gait` and `truth_row`."""
     after[:] = before
     state, gains = after.view(ROBOT_STATE)[0], gains_row.view(GAINS)[0]
-    _read(state, readings, schedule, dt)
-    state.quat_wxyz[:], state.position[:], state.velocity[:] = truth[:4], truth[4:7], truth[7:10]
-    R = rotation_matrix(state.quat_wxyz)
-    state.R[:], state.omega[:] = R, R.T @ truth[10:13]
-    p_leg, _, _ = leg_kinematics(state.q_joint, state.v_joint, gains)
-    for leg in range(4):
-        state.p_foot[leg] = state.position + R @ p_leg[leg]
-    state.filter_mean[0], state.filter_mean[1], state.filter_mean[2:] = (
-        state.position,
-        state.velocity,
-        state.p_foot,
-    )
-    state.covariance[:] = known_covariance()
-    forget_foot_load(state)
-    state.foot_force[:] = truth[13:]
-    for leg in range(4):
-        state.foot_loaded[leg] = 1.0 if truth[13 + leg] >= gains.contact_force else 0.0
-    _complete(state, gains)
-
-
-@compiled
-def _read(state: np.record, readings: Array, schedule: Array, dt: float) -> None:
-    """Take in the gait and the readings of a tick."""
     state.dt = dt
     state.stance[:], state.progress = schedule[:4], schedule[4]
     state.switched = 1.0 if schedule[5] != state.half_cycle else 0.0
@@ -141,11 +100,14 @@ def _read(state: np.record, readings: Array, schedule: Array, dt: float) -> None
     state.tau_joint[:], state.quat_wxyz[:] = readings[_TAU_JOINT], readings[_QUAT]
     state.omega[:], state.accel[:] = readings[_GYRO], readings[_ACCEL]
     state.foot_counts[:] = readings[_FOOT_FORCE]
+    if len(truth) > 0:
+        _take_truth(state, gains, truth)
+    else:
+        take_imu_error_off(state)
+        update_foot_load(state, gains)
+        correction = filter_step(state, gains, foot_trust(state))
+        update_imu_error(state, correction, gains.tilt_time)
 
-
-@compiled
-def _complete(state: np.record, gains: np.record) -> None:
-    """What follows from trunk, feet and their loads."""
     R, quat = state.R, state.quat_wxyz
     norm = np.sqrt(np.sum(quat * quat))
     state.q[:3], state.q[3:6], state.q[6] = state.position, quat[1:] / norm, quat[0] / norm
@@ -154,6 +116,23 @@ def _complete(state: np.record, gains: np.record) -> None:
     state.outputs[:] = outputs_at(state)
     update_contacts(state, gains)
     update_payload(state, gains)
+
+
+@compiled
+def _take_truth(state: np.record, gains: np.record, truth: Array) -> None:
+    """Have a robot know where it is and what its feet bear; the filter goes on from there."""
+    state.quat_wxyz[:], state.position[:], state.velocity[:] = truth[:4], truth[4:7], truth[7:10]
+    R = rotation_matrix(state.quat_wxyz)
+    state.R[:], state.omega[:] = R, R.T @ truth[10:13]
+    p_leg, _, _ = leg_kinematics(state.q_joint, state.v_joint, gains)
+    for leg in range(4):
+        state.p_foot[leg] = state.position + R @ p_leg[leg]
+    state.filter_mean[0], state.filter_mean[1] = state.position, state.velocity
+    state.filter_mean[2:], state.covariance[:] = state.p_foot, known_covariance()
+    forget_foot_load(state)
+    state.foot_force[:] = truth[13:]
+    for leg in range(4):
+        state.foot_loaded[leg] = 1.0 if truth[13 + leg] >= gains.contact_force else 0.0
 
 
 @compiled

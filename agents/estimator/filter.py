@@ -23,16 +23,20 @@ from quadriga.shared.runtime.jit import compiled
 _IMU_ERROR_MOST: Final = 0.5  # m/s²
 _FASTEST: Final = 0.5  # s, time constant of the IMU's error at first
 _TILT_SHARE: Final = 0.3  # of an error of 0.01 rad · g beside one of 0.15 m/s², by variance
+_ACCEL_SIGMA: Final = 0.3  # m/s², process noise of the velocity
+_FOOT_SIGMA: Final = 0.05  # m/s, process noise of a stance foot
+_SWING_SIGMA: Final = 30.0  # m/s, process noise of a swing foot
+_LEG_POSITION_SIGMA: Final = 1.5e-3  # m, of the leg kinematics
+_LEG_VELOCITY_SIGMA: Final = 0.1  # m/s, likewise
+_TRUST_RAMP: Final = 0.3  # share of stance over which trust rises, and over which it falls
+_TRUST_FORCE: Final = 10.0  # N, a foot with less load is not trusted
 
 
 @compiled
 def take_imu_error_off(state: np.record) -> None:
-    """Take the estimated error off attitude and accelerometer.
+    """Take the estimated error off `quat_wxyz` and `accel`.
 
     The attitude becomes q ⊗ (1, −r/2) for its error r: exact to second order, of any norm.
-
-    Args:
-        state: `ROBOT_STATE`; `quat_wxyz` and `accel` change.
     """
     error = state.imu_error
     w, x, y, z = state.quat_wxyz
@@ -51,7 +55,7 @@ def update_imu_error(state: np.record, correction: Array, time_constant: float) 
     """Go on with the estimate: what the legs take back of the velocity is the error that is left.
 
     Args:
-        state: `ROBOT_STATE`; `imu_error` and its age change.
+        state: of which `imu_error` and its age change.
         correction: of the trunk's velocity by the legs at this tick, (3,), m/s, odometry frame.
         time_constant: of the estimate, s, once it is that old, before it its age; 0: none is made.
     """
@@ -70,12 +74,7 @@ def specific_force_at_origin(accel: Array, omega: Array, imu: Array) -> Array:
     """Specific force at the trunk's origin, a − ω × (ω × r), (3,), m/s², trunk frame.
 
     The term of the angular acceleration is left out: no sensor measures it, and differences of the
-    gyro's samples are noisier than it is large.
-
-    Args:
-        accel: what the accelerometer measures, (3,), m/s², trunk frame.
-        omega: angular velocity ω, (3,), rad/s, trunk frame.
-        imu: where it is, r, (3,), m, trunk frame.
+    gyro's samples are noisier than it is large. `imu` is where the accelerometer is, r, (3,), m.
     """
     return accel - cross(omega, cross(omega, imu))
 
@@ -87,12 +86,12 @@ def known_covariance() -> Array:
 
 
 @compiled
-def foot_trust(state: np.record, gains: np.record) -> Array:
+def foot_trust(state: np.record) -> Array:
     """Trust (4,) in each foot as an anchor: ramps in and out of stance, zero without load."""
-    trust, progress, ramp = np.zeros(4), state.progress, gains.trust_ramp
-    edge = 1.0 if ramp <= 0.0 else min(1.0, min(progress, 1.0 - progress) / ramp + 0.02)
+    trust, progress = np.zeros(4), state.progress
+    edge = min(1.0, min(progress, 1.0 - progress) / _TRUST_RAMP + 0.02)
     for leg in range(4):
-        if state.stance[leg] > 0.5 and state.foot_force[leg] >= gains.trust_force:
+        if state.stance[leg] > 0.5 and state.foot_force[leg] >= _TRUST_FORCE:
             trust[leg] = edge
     return trust
 
@@ -101,10 +100,7 @@ def foot_trust(state: np.record, gains: np.record) -> Array:
 def filter_step(state: np.record, gains: np.record, trust: Array) -> Array:
     """Predict with the accelerometer over `dt`, correct with the leg kinematics.
 
-    Args:
-        state: `ROBOT_STATE` with the readings of this tick; filter, trunk and feet change.
-        gains: `GAINS`.
-        trust: in each foot as an anchor, (4,), 0 (swing, unloaded) to 1.
+    `trust`, (4,), is that in each foot as an anchor, 0 (swing, unloaded) to 1.
 
     Returns:
         How the legs corrected the trunk's velocity, (3,), m/s, odometry frame.
@@ -118,17 +114,17 @@ def filter_step(state: np.record, gains: np.record, trust: Array) -> Array:
     up = np.array([0.0, 0.0, gains.foot_radius])
     for leg in range(4):
         v_roll[leg] = cross(omega + R @ omega_leg[leg], up)
-    _predict(state, gains, acceleration, v_roll, trust)
+    _predict(state, acceleration, v_roll, trust)
     expected = mean[1].copy()
     for leg in range(4):
         reach, foot = R @ p_leg[leg], 2 + leg
         gain = covariance[:, foot] - covariance[:, 0]  # the foot's place less the trunk's
-        variance = gain[foot] - gain[0] + gains.leg_position_sigma**2
+        variance = gain[foot] - gain[0] + _LEG_POSITION_SIGMA**2
         _correct(state, gain, variance, reach - (mean[foot] - mean[0]))
         if trust[leg] > 0.0:
             v_trunk = v_roll[leg] - R @ v_leg[leg] - cross(omega, reach)
             gain = covariance[:, 1].copy()
-            variance = gain[1] + (gains.leg_velocity_sigma / trust[leg]) ** 2
+            variance = gain[1] + (_LEG_VELOCITY_SIGMA / trust[leg]) ** 2
             _correct(state, gain, variance, v_trunk - mean[1])
     for leg in range(4):
         state.p_foot[leg] = mean[0] + R @ p_leg[leg]
@@ -139,9 +135,7 @@ def filter_step(state: np.record, gains: np.record, trust: Array) -> Array:
 
 
 @compiled
-def _predict(
-    state: np.record, gains: np.record, acceleration: Array, v_roll: Array, trust: Array
-) -> None:
+def _predict(state: np.record, acceleration: Array, v_roll: Array, trust: Array) -> None:
     """Advance mean and covariance by `dt`: the trunk accelerates, stance feet roll."""
     mean, covariance, dt = state.filter_mean, state.covariance, state.dt
     mean[0] += dt * mean[1] + 0.5 * dt * dt * acceleration
@@ -150,24 +144,20 @@ def _predict(
         covariance[0, column] += dt * covariance[1, column]
     for row in range(6):
         covariance[row, 0] += dt * covariance[row, 1]
-    covariance[1, 1] += (gains.accel_sigma * dt) ** 2
+    covariance[1, 1] += (_ACCEL_SIGMA * dt) ** 2
     for leg in range(4):
         if trust[leg] > 0.0:
             mean[2 + leg] += dt * v_roll[leg]
-            covariance[2 + leg, 2 + leg] += (gains.foot_sigma * dt / trust[leg]) ** 2
+            covariance[2 + leg, 2 + leg] += (_FOOT_SIGMA * dt / trust[leg]) ** 2
         else:
-            covariance[2 + leg, 2 + leg] += (gains.swing_sigma * dt) ** 2
+            covariance[2 + leg, 2 + leg] += (_SWING_SIGMA * dt) ** 2
 
 
 @compiled
 def _correct(state: np.record, gain: Array, variance: float, innovation: Array) -> None:
-    """Scalar Kalman update.
+    """Scalar Kalman update of mean and covariance, for all axes alike.
 
-    Args:
-        state: `ROBOT_STATE`; mean and covariance change.
-        gain: P hᵀ of the measurement's row h, (6,).
-        variance: h P hᵀ plus the measurement's own.
-        innovation: measured less expected, one for each axis, (3,).
+    `gain` is P hᵀ of the measurement's row h, `variance` h P hᵀ plus the measurement's own.
     """
     gain_over_s = gain / variance
     for row in range(6):

@@ -19,10 +19,12 @@ import numpy as np
 
 from quadriga.agents.estimator.filter import specific_force_at_origin
 from quadriga.agents.estimator.kinematics import rotation_matrix
-from quadriga.agents.estimator.leg_dynamics import foot_forces, reaction_torques
+from quadriga.agents.estimator.rigid_body import foot_forces, reaction_torques
 from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.jit import compiled
 
+_FILTER_TIME: Final = 3e-3  # s, of both filters of the load by torques
+_LEAST_TORQUE_FORCE: Final = 12.0  # N by torques, from which on a foot is in contact
 _LEAST_SPREAD: Final = 8.0  # N, standard deviation of the load that shows a sensor's scale
 _LEAST_COVARIANCE: Final = 1e-6  # N · count; that of a sensor stuck at one count decays to nothing
 _CORRELATED: Final = (0.6, 0.9)  # squared correlation: a sensor counts from, and counts fully from
@@ -37,26 +39,24 @@ _RELEASE: Final = 0.5  # of the load by torques that begins a contact: with less
 
 @compiled
 def update_foot_load(state: np.record, gains: np.record) -> None:
-    """Update `foot_force` and `foot_loaded`, and what is remembered for them.
-
-    Args:
-        state: `ROBOT_STATE` with the readings of this tick.
-        gains: `GAINS`.
-    """
-    filter_time = 1e-3 * gains.reaction_filter_ms
-    force = _force_by_torques(state, gains, filter_time)
+    """Update `foot_force` and `foot_loaded`, and what is remembered for them."""
+    force = _force_by_torques(state, gains)
     if not np.isfinite(np.sum(force)):
         forget_foot_load(state)  # absurd readings would stay in the filters: all begins anew
         return
     counts = np.minimum(_MOST, np.maximum(-_MOST, state.foot_counts))
-    _smooth_counts(state, counts, state.dt / (filter_time + state.dt))
+    rate, once, twice = state.dt / (_FILTER_TIME + state.dt), state.counts, state.counts_smooth
+    if state.load_ticks < 0.5:
+        once[:], twice[:] = counts, counts
+    once += rate * (counts - once)  # filtered like the forces by torques
+    twice += rate * (once - twice)
     for leg in range(4):
         by_torque = force[leg, 2]
         _compare(state, leg, by_torque, gains.calibration_time)
         by_sensor, error, weight = _force_by_sensor(state, leg, by_torque, counts[leg])
         state.foot_force[leg] = max(0.0, by_torque + weight * (by_sensor - by_torque))
         carries = state.loaded_by_torque[leg] > 0.5
-        least = gains.contact_torque_force * (_RELEASE if carries else 1.0)
+        least = _LEAST_TORQUE_FORCE * (_RELEASE if carries else 1.0)
         state.loaded_by_torque[leg] = 1.0 if by_torque >= least else 0.0
         shows = weight > 0.5 and by_sensor >= gains.contact_force + _SURE * error
         state.foot_loaded[leg] = 1.0 if by_torque >= least or shows else 0.0
@@ -75,7 +75,7 @@ def forget_foot_load(state: np.record) -> None:
 
 
 @compiled
-def _force_by_torques(state: np.record, gains: np.record, filter_time: float) -> Array:
+def _force_by_torques(state: np.record, gains: np.record) -> Array:
     """Forces of the ground on the feet, late by two filters, (4, 3), N, odometry frame.
 
     The joints' accelerations are those of the filtered rates, (v − v̄) / T with v̄' = (v − v̄) / T;
@@ -83,12 +83,12 @@ def _force_by_torques(state: np.record, gains: np.record, filter_time: float) ->
     Actuator failure detection and isolation using generalized momenta, 2003). Rates are noisy, so
     that it is filtered once more.
     """
-    rate, begins = state.dt / (filter_time + state.dt), state.load_ticks < 0.5
+    rate, begins = state.dt / (_FILTER_TIME + state.dt), state.load_ticks < 0.5
     v_smooth, once, twice = state.v_smooth, state.torque, state.torque_smooth
     if begins:
         v_smooth[:] = state.v_joint
     v_smooth += rate * (state.v_joint - v_smooth)
-    acceleration = (state.v_joint - v_smooth) / filter_time
+    acceleration = (state.v_joint - v_smooth) / _FILTER_TIME
     specific_force = specific_force_at_origin(state.accel, state.omega, gains.imu)
     static, inertial = reaction_torques(state, acceleration, specific_force, gains.links)
     if begins:
@@ -100,16 +100,6 @@ def _force_by_torques(state: np.record, gains: np.record, filter_time: float) ->
         state.ground_force[leg] = R @ in_trunk[leg]
     force: Array = state.ground_force
     return force
-
-
-@compiled
-def _smooth_counts(state: np.record, counts: Array, rate: float) -> None:
-    """Filter the sensors' counts like the forces by torques."""
-    once, twice = state.counts, state.counts_smooth
-    if state.load_ticks < 0.5:
-        once[:], twice[:] = counts, counts
-    once += rate * (counts - once)
-    twice += rate * (once - twice)
 
 
 @compiled

@@ -2,19 +2,22 @@
 
 A tick goes from one row of numbers to the next: compiled code takes a row for the price of one
 array. `row.view(ROBOT_STATE)[0]` names its parts, `state.contact[leg]`, there and in plain Python.
+In all compiled code `state` is a record of `ROBOT_STATE` and `gains` one of `GAINS`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import asdict, fields
 from typing import Any, ClassVar, Final
 
 import numpy as np
+import pinocchio as pin
 
-from quadriga.agents.estimator.leg_dynamics import LINK_SIZE, N_LINKS, rigid_body
+from quadriga.agents.estimator.rigid_body import LINK_SIZE, N_LINKS, link_table
 from quadriga.shared.config.sections import Config, ControllerConfig, EstimatorConfig
 from quadriga.shared.robots.conventions import N_FORCES, N_JOINTS, N_LEGS, N_OUTPUTS, Array, Leg
+from quadriga.shared.robots.pinocchio_model import build_pinocchio_model
 from quadriga.shared.robots.spec import Geometry
 from quadriga.shared.robots.torque_speed import motor_curves
 from quadriga.shared.runtime.record import record
@@ -108,24 +111,17 @@ ROBOT_STATE: Final = np.dtype(
     )
 )
 
-# Keys whose names the fitted predictors carry, under the words of this code.
-_NAMES: Final = {
-    "reflex_ms": "retraction_ms",
-    "reflex_lift": "retraction_speed",
-    "flight": "free_fall_reference",
-}
-_KEYS: Final = [
-    f.name
-    for section in (ControllerConfig, EstimatorConfig)
-    for f in fields(section)
-    if f.type != "str"
-]
 # The numbers of the sections `controller` and `estimator` under their keys, units there, and those
 # of the robot: `Geometry`, and
 GAINS: Final = np.dtype(
     (
         np.record,
-        [(_NAMES.get(key, key), float) for key in _KEYS]
+        [
+            (key.name, float)
+            for section in (ControllerConfig, EstimatorConfig)
+            for key in fields(section)
+            if key.type != "str"
+        ]
         + [(name, float) for name in Geometry._fields]
         + [
             ("stance_time", float),  # duration of the half cycle, s
@@ -135,9 +131,9 @@ GAINS: Final = np.dtype(
             ("stand_height", float),  # of the trunk's origin, m
             ("weight", float),  # of the bare robot, N; nominal forces carry it
             ("links", float, (N_LINKS, LINK_SIZE)),  # `link_table` of the bare robot
-            ("body_mass", float),  # the bare robot as one rigid body, see `RigidBody`, kg
-            ("com", float, 3),
-            ("inertia_inverse", float, (3, 3)),
+            ("body_mass", float),  # of the bare robot, kg
+            ("com", float, 3),  # its centre of mass in the nominal pose, m, trunk frame
+            ("inertia_inverse", float, (3, 3)),  # about that, 1/(kg·m²), trunk frame
             ("motors", float, (4, N_JOINTS)),  # rows of `MotorCurves`
         ],
     )
@@ -147,20 +143,22 @@ GAINS: Final = np.dtype(
 def gains_row(config: Config) -> Array:
     """The row of `GAINS` that a configuration and its robot set."""
     robot, row = config.robot, np.zeros(GAINS.itemsize // 8)
-    body = rigid_body(robot, rotors=config.motors.rotor_inertia)
     gains = row.view(GAINS)[0]
-    for section in (config.controller, config.estimator):
-        for key in (f.name for f in fields(section) if f.name in _KEYS):
-            gains[_NAMES.get(key, key)] = getattr(section, key)
-    for name, value in robot.geometry._asdict().items():
-        gains[name] = value
+    known = asdict(config.controller) | asdict(config.estimator) | robot.geometry._asdict()
+    for name in known.keys() & set(GAINS.names or ()):
+        gains[name] = known[name]
     gains.stance_time = 1e-3 * config.gait.stance_ms
-    gains.mu_slippery = min(gains.mu_min, gains.mu_slippery)
     gains.imu, gains.under_hip = robot.imu, robot.feet_under_hips[Leg.FL]
     gains.reach, gains.weight, gains.stand_height = robot.reach, robot.weight, robot.stand_height
-    gains.links, gains.body_mass = body.links, body.mass
-    gains.com, gains.inertia_inverse = body.com, body.inertia_inverse
     gains.motors = np.array(motor_curves(robot, torque_speed=config.motors.torque_speed))
+
+    model = build_pinocchio_model(robot, rotors=config.motors.rotor_inertia)
+    q, data = pin.neutral(model), model.createData()
+    q[7:] = robot.q_stand
+    pin.ccrba(model, data, q, np.zeros(model.nv))
+    gains.links, gains.body_mass = link_table(model), pin.computeTotalMass(model)
+    gains.com = pin.centerOfMass(model, data, q)
+    gains.inertia_inverse = np.linalg.inv(data.Ig.inertia)
     return row
 
 

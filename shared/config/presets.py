@@ -15,11 +15,11 @@ _SOFT: Final = {
 # weights gamma alone: scheduled contacts, flat ground, a position reference of limited lead,
 # moderate gains. Walks on flat ground; see `robust` for what keeps a team up elsewhere.
 _PLAIN: Final = {
-    "ki_z": 0.0, "kp_xy": 100.0, "kd_xy": 20.0, "ki_xy": 0.0, "position_error_limit": 0.05,
+    "ki_z": 0.0, "kp_xy": 100.0, "kd_xy": 20.0, "ki_xy": 0.0,
     "kp_tilt": 400.0, "kd_tilt": 40.0, "contact_detection": False, "swing_height": 0.07,
     "load_time": 0.0, "reject_side_contacts": False, "reflex_ms": 0,
     "swing_delay": 0.0, "track_sinking_trunk": False, "flight": False, "slip_speed": 0.0,
-    "swing_acceleration": 1e4, "foothold_inwards": 10.0, "contact_force": 8.0, "force_min": 2.0,
+    "foothold_inwards": 10.0, "contact_force": 8.0, "force_min": 2.0,
     "descent_speed": 0.5, "tilt_length": 1.0, "swing_weight": 1.0,
 }  # fmt: skip
 

@@ -249,16 +249,9 @@ class EstimatorConfig:
     """The agent's Kalman filter on IMU and leg kinematics."""
 
     kind: str = choice(("kalman", "truth"), "truth: the simulator's, for comparison only")
-    accel_sigma: float = number(0.3, "m/s²", 1e-4, 100.0, "process noise of the velocity")
-    foot_sigma: float = number(0.05, "m/s", 1e-5, 10.0, "process noise of a stance foot")
-    swing_sigma: float = number(30.0, "m/s", 0.1, 1e3, "process noise of a swing foot")
-    leg_position_sigma: float = number(1.5e-3, "m", 1e-6, 0.5, "leg kinematics, position")
-    leg_velocity_sigma: float = number(0.1, "m/s", 1e-5, 10.0, "leg kinematics, velocity")
-    trust_ramp: float = number(0.3, "1", 0.0, 0.5, "share of stance over which trust rises, falls")
     tilt_time: float = number(
         5.0, "s", 0.0, 1e4, "time constant of finding the IMU's tilt and bias by the legs; 0: never"
     )
-    trust_force: float = number(10.0, "N", 0.0, 200.0, "a foot with less load is not trusted")
 
 
 @dataclass(frozen=True, slots=True)
@@ -283,10 +276,6 @@ class ControllerConfig:
     tilt_length: float = number(0.15, "m", 0.01, 10.0, "angular against linear defect (paper: 1)")
     swing_weight: float = number(0.3, "1", 0.01, 10.0, "swing feet's against trunk's (paper: 1)")
     mu: float = number(0.6, "1", 0.05, 2.0, "friction coefficient the QP may use")
-    mu_min: float = number(0.35, "1", 0.05, 2.0, "the least it uses, even while feet slide")
-    mu_slippery: float = number(0.12, "1", 0.02, 2.0, "likewise, where feet that slide show less")
-    mu_recovery: float = number(2.0, "1/s", 0.0, 10.0, "its rate of recovery; below mu_min a tenth")
-    slip_load: float = number(20.0, "N", 0.0, 200.0, "slip detection ignores a foot with less")
     slip_speed: float = number(0.3, "m/s", 0.0, 5.0, "a faster stance foot slides; 0: never")
     force_min: float = number(5.0, "N", 0.0, 50.0, "least normal force of a stance foot")
     kp_z: float = number(400.0, "1/s²", 0.0, 1e4, "height")
@@ -295,10 +284,6 @@ class ControllerConfig:
     kp_xy: float = number(0.0, "1/s²", 0.0, 1e4, "position, against the integrated speed")
     kd_xy: float = number(20.0, "1/s", 0.0, 1e3, "velocity")
     ki_xy: float = number(40.0, "1/s²", 0.0, 1e4, "velocity integrator")
-    # Yoked robots share one speed: without a leak their estimators' biases would wind the
-    # integrators up against each other.
-    leak_xy: float = number(6.0, "s", 0.01, 1e6, "time constant of its forgetting")
-    position_error_limit: float = number(0.05, "m", 0.0, 1.0, "of the position reference's lead")
     kp_tilt: float = number(1000.0, "1/s²", 0.0, 1e4, "roll and pitch")
     kd_tilt: float = number(60.0, "1/s", 0.0, 1e3, "roll and pitch rate")
     kp_yaw: float = number(100.0, "1/s²", 0.0, 1e4, "yaw")
@@ -307,28 +292,18 @@ class ControllerConfig:
     kd_swing: float = number(40.0, "1/s", 0.0, 1e3, "swing foot rate")
     contact_detection: bool = flag(True, "early touchdown becomes stance, a lost foot descends")
     contact_force: float = number(4.0, "N", 0.5, 100.0, "load by a foot sensor that is contact")
-    contact_torque_force: float = number(12.0, "N", 0.5, 200.0, "load by torques that is contact")
-    reaction_filter_ms: float = number(
-        3.0, "ms", 0.5, 100.0, "time constant of both filters of the load by the joints' torques"
-    )
     calibration_time: float = number(3.0, "s", 0.1, 1e4, "time constant of foot sensors' fit")
-    lost_contact_ms: int = number(5, "ms", 1, 100, "stance without force until it descends")
     descent_speed: float = number(0.8, "m/s", 0.0, 3.0, "speed of a descending stance foot")
     reject_side_contacts: bool = flag(
         True, "a foot stopped from the side is no contact, nor an early one that bears no load"
     )
     reflex_ms: int = number(10, "ms", 0, 100, "a stopped swing foot rises until free for this")
-    reflex_lift: float = number(1.0, "m/s", 0.0, 3.0, "its upward speed")
     track_sinking_trunk: bool = flag(
         True, "a descending foot follows a sinking trunk; desired feet stay within reach"
     )
     flight: bool = flag(True, "without contact the desired motion of the trunk is free fall")
     load_time: float = number(1.0, "s", 0.0, 100.0, "time constant of the external load; 0: none")
     swing_delay: float = number(0.0, "1", 0.0, 0.5, "share of swing in which a foot only rises")
-    swing_acceleration: float = number(
-        100.0, "m/s²", 1.0, 1e4, "a late swing has a foothold so near that it needs no more"
-    )
-    ground_filter_ms: float = number(50.0, "ms", 0.0, 1e3, "filter of the ground height")
     swing_height: float = number(0.09, "m", 0.01, 0.2, "apex above the higher foothold")
     raibert_gain: float = number(0.03, "s", 0.0, 0.5, "foothold per velocity error")
     foothold_inwards: float = number(

@@ -9,13 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from quadriga.agents.gait import (
-    half_cycle_stance,
-    phase_offset_ms,
-    scheduled_stance,
-    stance_progress,
-)
+from quadriga.agents.gait import STANDING, Gait, scheduled_stance
 from quadriga.shared.config.sections import Config, GaitConfig
+from quadriga.shared.modes import STAND, WALK, Mode
 from quadriga.shared.robots.conventions import GRAVITY, Leg
 from tests.a1 import TOTAL_MASS, nominal_forces
 
@@ -36,46 +32,29 @@ def of(gait: GaitConfig, *, alternate: bool = True) -> Config:
 def test_diagonal_pairs_stand_in_turn_for_the_stance_time(
     gait: GaitConfig, index: int, alternate: bool
 ) -> None:
-    """Duty one half: after the stand, of any period every leg stands exactly half."""
-    config = of(gait, alternate=alternate)
-    ticks = np.arange(gait.stand_ms + 4 * gait.stance_ms)
-    stance = scheduled_stance(config, index, ticks)
+    """Duty one half; every second robot trots half a period later, unless they trot together."""
+    ticks, half = np.arange(gait.stand_ms + 4 * gait.stance_ms), gait.stance_ms
+    stance = scheduled_stance(of(gait, alternate=alternate), index, ticks)
     assert stance[: gait.stand_ms].all()
     walking = stance[gait.stand_ms :]
     assert (walking.sum(axis=1) == 2).all()
     np.testing.assert_array_equal(walking[:, Leg.FL], walking[:, Leg.RR])
     np.testing.assert_array_equal(walking[:, Leg.FR], walking[:, Leg.RL])
-    half = gait.stance_ms
     np.testing.assert_array_equal(walking[half:], ~walking[:-half])
-    assert (walking[:half] == walking[0]).all()
-
-
-@given(GAITS)
-@settings(deadline=None, max_examples=20)
-def test_every_second_robot_trots_half_a_period_later(gait: GaitConfig) -> None:
-    ticks = gait.stand_ms + np.arange(2 * gait.stance_ms)
-    first, second, third = (scheduled_stance(of(gait), index, ticks) for index in range(3))
-    np.testing.assert_array_equal(first, ~second)
-    np.testing.assert_array_equal(first, third)
-    together = scheduled_stance(of(gait, alternate=False), 1, ticks)
-    np.testing.assert_array_equal(first, together)
-    assert phase_offset_ms(of(gait), 1) == gait.stance_ms
+    assert (walking[:half, Leg.FL] == (not alternate or index % 2 == 0)).all()
 
 
 @given(GAITS, st.integers(0, 1), st.integers(0, 5000))
 @settings(deadline=None, max_examples=60)
-def test_progress_and_half_say_the_same_as_the_schedule(
+def test_a_row_of_the_gait_says_the_same_as_the_schedule(
     gait: GaitConfig, index: int, since: int
 ) -> None:
     config, tick = of(gait), gait.stand_ms + since
-    progress, half = stance_progress(config, index, tick)
+    *stance, progress, half_cycle = Gait(config, index).at(tick, Mode(WALK, 0))
     assert progress == (since % gait.stance_ms) / gait.stance_ms
-    expected = scheduled_stance(config, index, np.array([tick]))[0]
-    np.testing.assert_array_equal(half_cycle_stance(half), expected)
-
-
-def test_standing_is_half_minus_one() -> None:
-    assert half_cycle_stance(-1).all()
+    assert half_cycle == (since // gait.stance_ms + index) % 2
+    np.testing.assert_array_equal(stance, scheduled_stance(config, index, np.array([tick]))[0])
+    assert Gait(config, index).at(tick, Mode(STAND, 0)) is STANDING
 
 
 @pytest.mark.parametrize("legs", range(1, 16))
@@ -86,11 +65,5 @@ def test_nominal_forces_carry_the_weight_on_the_stance_feet(legs: int) -> None:
     assert not forces[:, :2].any()
     assert not forces[~stance].any()
     assert np.ptp(forces[stance, 2]) == 0.0
-
-
-def test_nominal_forces_of_many_instants_and_of_no_stance_at_all() -> None:
-    stance = np.array([[True] * 4, [True, False, False, True], [False] * 4])
-    forces = nominal_forces(stance)
-    assert forces.shape == (3, 12)
-    assert not forces[2].any()
-    np.testing.assert_array_equal(forces[1], nominal_forces(stance[1]))
+    many = nominal_forces(np.array([stance, np.zeros(4, dtype=bool)]))
+    np.testing.assert_array_equal(many, [forces.ravel(), np.zeros(12)])

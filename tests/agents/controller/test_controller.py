@@ -18,16 +18,15 @@ from quadriga.agents.controller.trunk import TrunkCommand
 from quadriga.agents.controller.whole_body_qp import WholeBodySolution
 from quadriga.agents.estimator.estimator import estimate
 from quadriga.agents.estimator.robot_state import RobotState, gains_row
-from quadriga.agents.gait import Schedule
+from quadriga.agents.gait import STANDING
 from quadriga.shared.config.sections import Config, GaitConfig, PlannerConfig, TeamConfig
 from quadriga.shared.messages import Reference, State
 from quadriga.shared.robots.conventions import GRAVITY, Array
 from tests.a1 import STAND_HEIGHT, TOTAL_MASS, standing
 from tests.agents.estimator.poses import DT
 
-STANDING = Schedule(np.ones(4), 0.5, -1)
 TROT = np.array([1.0, 0.0, 0.0, 1.0])
-WALKING = Schedule(TROT, 0.3, 0)
+WALKING = np.array([*TROT, 0.3, 0.0])
 REST = TrunkCommand(0.0, 0.0, 0.0, STAND_HEIGHT, np.zeros(12), feedforward=False)
 
 
@@ -43,7 +42,7 @@ class LowLevel:
     def step(
         self,
         sensors: State | None = None,
-        schedule: Schedule = STANDING,
+        schedule: Array = STANDING,
         command: TrunkCommand = REST,
         truth: Array | None = None,
     ) -> WholeBodySolution:
@@ -76,7 +75,7 @@ def test_planned_deviations_are_asked_of_the_stance_feet_in_the_yaw_frame() -> N
     yaw, deviation = 0.9, np.arange(12.0)
     robot = LowLevel(gamma_tau=1e-6, gamma_defect=1.0, gamma_force=1e6, load_time=0.0)
     truth = known_at(yaw, np.full(4, 30.0))
-    solution = robot.step(command=replace(REST, deviation=deviation), truth=truth)
+    solution = robot.step(command=REST._replace(deviation=deviation), truth=truth)
     expected = deviation.reshape(4, 3) @ pin.utils.rotate("z", yaw).T
     expected[:, 2] += TOTAL_MASS * GRAVITY / 4
     np.testing.assert_allclose(solution.force, expected, atol=0.02)
@@ -85,7 +84,7 @@ def test_planned_deviations_are_asked_of_the_stance_feet_in_the_yaw_frame() -> N
 def test_nothing_is_asked_of_legs_scheduled_to_swing() -> None:
     found = []
     for share in (0.0, 50.0):
-        command = replace(REST, deviation=share * np.repeat(1.0 - TROT, 3), feedforward=True)
+        command = REST._replace(deviation=share * np.repeat(1.0 - TROT, 3), feedforward=True)
         solution = LowLevel().step(None, WALKING, command, known_at(0.0, 30.0 * TROT))
         found.append(solution.tau.tobytes())
     assert found[0] == found[1]

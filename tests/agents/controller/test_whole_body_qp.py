@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -25,8 +26,7 @@ from quadriga.shared.robots.conventions import GRAVITY, Array
 from quadriga.shared.robots.torque_speed import motor_curves
 from quadriga.sim_server.world.motors import Motors
 from tests.a1 import TORQUE_LIMIT, TOTAL_MASS
-from tests.agents.controller.full_qp import desired, dynamics, solve_full
-from tests.agents.estimator.poses import gains_of, random_pose, standing_pose, terms_of
+from tests.agents.estimator.poses import FEET, MODEL, gains_of, random_pose, standing_pose, terms_of
 from tests.sim_server.standing import IDEAL_MOTORS, command
 
 PLAIN = {"force_min": 2.0, "tilt_length": 1.0, "swing_weight": 1.0}
@@ -74,15 +74,54 @@ def check_limits(solution: WholeBodySolution) -> None:
 @pytest.mark.parametrize("size", [1.0, 20.0])
 @pytest.mark.parametrize("weights", [WEIGHTS, BY_LENGTH], ids=["plain", "by_length"])
 def test_the_reduced_problem_is_the_full_one(contact: Array, size: float, weights: Any) -> None:
-    """Torques, forces and defect of the formulation with 12 + 3 n_c + n_h variables."""
+    """For any torques it has the forces, the defect, the cost and the limits of the full problem.
+
+    v̇ = M⁻¹ (S τ + J_cᵀ f − h), the feet in contact do not accelerate, and the defect is what the
+    outputs (trunk, then the other feet) miss of their desired accelerations, all by Pinocchio.
+    """
     random = np.random.default_rng(round(size) + int(contact @ [1, 2, 4, 8]))
-    pose = randomly_asked(random, contact, size)
-    solution = solution_of(pose, weights)
-    tau, force, defect = solve_full(pose, weights)
-    np.testing.assert_allclose(solution.tau, tau, atol=1e-5)
-    np.testing.assert_allclose(solution.force[contact > 0.5].ravel(), force, atol=1e-4)
-    np.testing.assert_allclose(solution.defect[: len(defect)], defect, atol=1e-4)
-    check_limits(solution)
+    pose, data = randomly_asked(random, contact, size), MODEL.createData()
+    qp, on, R = solution_of(pose, weights), contact > 0.5, pose.R
+    M = pin.crba(MODEL, data, pose.q)
+    M_inverse = np.linalg.inv(np.triu(M) + np.triu(M, 1).T)
+    nle = pin.rnea(MODEL, data, pose.q, pose.v, np.zeros(18)).copy()
+    pin.computeJointJacobians(MODEL, data, pose.q)
+    pin.forwardKinematics(MODEL, data, pose.q, pose.v, np.zeros(18))
+    pin.updateFramePlacements(MODEL, data)
+    world = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+    J = np.array([pin.getFrameJacobian(MODEL, data, foot, world)[:3] for foot in FEET])
+    drift = np.array(
+        [pin.getFrameClassicalAcceleration(MODEL, data, foot, world).linear for foot in FEET]
+    )
+    n_f, n_h = 3 * qp.feet, 18 - 3 * qp.feet
+    W = np.repeat((1.0, weights.tilt_length, weights.swing_weight), (3, 3, n_h - 6))
+    full, reduced = [], []
+    for tau in (qp.tau, *(qp.tau + 2.0 * random.normal(size=(3, 12)))):
+        f, defect = qp.A[:n_f] @ tau + qp.a0[:n_f], qp.B[:n_h] @ tau + qp.defect0[:n_h]
+        driven = np.concatenate([np.zeros(6), tau]) + J[on].reshape(n_f, 18).T @ f
+        a = M_inverse @ (driven - nle)
+        np.testing.assert_allclose(J[on] @ a + drift[on], 0.0, atol=1e-5)
+        linear = R @ (a[:3] + np.cross(pose.v[3:6], pose.v[:3])) - pose.acc_des[:3]
+        np.testing.assert_allclose(defect[:3], linear, atol=1e-5)
+        np.testing.assert_allclose(defect[3:6], R @ a[3:6] - pose.acc_des[3:], atol=1e-5)
+        swing = J[~on] @ a + drift[~on] - pose.swing_acc_des[~on]
+        np.testing.assert_allclose(defect[6:], swing.ravel(), atol=1e-5)
+        f_error = f - pose.force_des[on].ravel()
+        parts = (tau @ tau, f_error @ f_error, np.sum((W * defect) ** 2))
+        gammas = (weights.gamma_tau, weights.gamma_force, weights.gamma_defect)
+        full.append(0.5 * np.dot(gammas, parts))
+        reduced.append(0.5 * tau @ qp.H @ tau + qp.g @ tau)
+        fx, fy, fz = f.reshape(-1, 3).T
+        along = weights.mu / np.sqrt(2) * fz
+        limits = [fz - weights.force_min, along - fx, along + fx, along - fy, along + fy]
+        slack = qp.C[: 5 * qp.feet] @ tau - qp.lower[12 : 12 + 5 * qp.feet]
+        np.testing.assert_allclose(slack.reshape(-1, 5).T, limits, atol=1e-6)
+    assert np.trace(qp.H) == pytest.approx(12.0)
+    scales = np.diff(reduced) / np.diff(full)
+    np.testing.assert_allclose(scales, scales[0], rtol=1e-5)
+    np.testing.assert_allclose(qp.force[on].ravel(), qp.A[:n_f] @ qp.tau + qp.a0[:n_f], atol=1e-9)
+    assert scales[0] > 0.0
+    check_limits(qp)
 
 
 def test_torques_keep_to_bounds_that_differ_up_and_down() -> None:
@@ -96,48 +135,6 @@ def test_torques_keep_to_bounds_that_differ_up_and_down() -> None:
         assert (tau <= bounds[1] + 1e-6).all()
         active += int((np.abs(tau - bounds) < 1e-6).any())
     assert active > 10, "most of these ask for more than a motor has"
-
-
-@pytest.mark.parametrize(
-    ("acc", "contact", "active"),
-    [
-        ([0.0, 0.0, 40.0, 0.0, 0.0, 0.0], TROT, "torque"),
-        ([0.0, 0.0, 80.0, 0.0, 0.0, 0.0], ALL, "torque"),
-        ([15.0, 0.0, 0.0, 0.0, 0.0, 0.0], ALL, "friction"),
-        ([0.0, -15.0, 0.0, 0.0, 0.0, 0.0], TROT, "friction"),
-        ([0.0, 0.0, -15.0, 0.0, 0.0, 0.0], ALL, "least force"),
-    ],
-)
-def test_active_limits_are_those_of_the_full_problem(
-    acc: list[float], contact: Array, active: str
-) -> None:
-    pose = asked(standing_pose(0.7), contact, np.array(acc))
-    solution = solution_of(pose)
-    assert solution.status == "constrained"
-    check_limits(solution)
-    force = solution.force[contact > 0.5]
-    bound = WEIGHTS.mu / np.sqrt(2) * force[:, 2]
-    at_limit = {
-        "torque": np.abs(solution.tau).max() > TORQUE_LIMIT - 1e-6,
-        "friction": (np.abs(force[:, :2]).max(axis=1) > bound - 1e-6).any(),
-        "least force": force[:, 2].min() < WEIGHTS.force_min + 1e-6,
-    }
-    assert at_limit[active]
-    tau, full_force, _ = solve_full(pose, WEIGHTS)
-    np.testing.assert_allclose(solution.tau, tau, atol=1e-5)
-    np.testing.assert_allclose(force.ravel(), full_force, atol=1e-4)
-
-
-def test_what_cannot_be_had_together_is_weighed_by_the_length() -> None:
-    """Two feet cannot turn the trunk about the line between them: what is given up for it?"""
-    across = A1.feet_under_hips[0] / np.linalg.norm(A1.feet_under_hips[0])
-    acc = np.array([0.0, 0.0, 5.0, *(100.0 * across), 0.0])
-    plain, by_length = (
-        solution_of(asked(standing_pose(), TROT, acc), weights).defect
-        for weights in (WEIGHTS, gains_of(**PLAIN | {"tilt_length": 0.15}))
-    )
-    assert np.linalg.norm(by_length[:3]) < 0.9 * np.linalg.norm(plain[:3])
-    assert np.linalg.norm(by_length[3:6]) > np.linalg.norm(plain[3:6])
 
 
 @given(st.integers(0, 2**31), st.sampled_from(STANCES), st.floats(0.1, 50.0))
@@ -159,20 +156,6 @@ def test_every_answer_is_optimal(seed: int, contact: Array, size: float) -> None
     if qp.status == "unconstrained":
         assert np.linalg.norm(gradient) < 1e-9 * scale
     check_limits(qp)
-
-
-@given(st.integers(0, 2**31), st.sampled_from(STANCES))
-@settings(deadline=None, max_examples=30)
-def test_forces_and_defect_obey_the_equation_of_motion(seed: int, contact: Array) -> None:
-    """Feet in contact do not accelerate; the defect is what the outputs miss of their reference."""
-    pose = randomly_asked(np.random.default_rng(seed), contact, 5.0)
-    solution, dyn = solution_of(pose), dynamics(pose)
-    force = solution.force[contact > 0.5].ravel()
-    driven = np.concatenate([np.zeros(6), solution.tau]) + dyn.J_c.T @ force
-    acceleration = dyn.M_inverse @ (driven - dyn.nle)
-    np.testing.assert_allclose(dyn.J_c @ acceleration + dyn.d_c, 0.0, atol=1e-5)
-    missed = dyn.J_h @ acceleration + dyn.d_h - desired(pose)
-    np.testing.assert_allclose(solution.defect[: len(missed)], missed, atol=1e-5)
 
 
 @pytest.mark.parametrize("contact", [ALL, TROT])

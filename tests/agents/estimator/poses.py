@@ -8,19 +8,17 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from quadriga.agents.controller.rigid_body import RigidBodyTerms, rigid_body_terms
-from quadriga.agents.estimator.leg_dynamics import rigid_body
+from quadriga.agents.estimator import robot_state
 from quadriga.agents.estimator.payload_friction import add_payload
-from quadriga.agents.estimator.robot_state import GAINS, ROBOT_STATE, RobotState, gains_row
+from quadriga.agents.estimator.rigid_body import RigidBodyTerms, rigid_body_terms
+from quadriga.agents.estimator.robot_state import ROBOT_STATE, RobotState, gains_row
 from quadriga.shared.config.sections import Config, MotorsConfig
 from quadriga.shared.messages import State
-from quadriga.shared.robots.a1 import A1
 from quadriga.shared.robots.conventions import FOOT_FRAMES, N_JOINTS, Array
 from tests.a1 import STAND_HEIGHT, build_pinocchio_model, q_stand
 
 MODEL = build_pinocchio_model()
 FEET = tuple(MODEL.getFrameId(name) for name in FOOT_FRAMES)
-BODY = rigid_body(A1)
 DT = 1e-3
 
 
@@ -28,7 +26,10 @@ def gains_of(**controller: Any) -> Any:
     """The record of `GAINS` of an A1 without rotors with these keys of the controller."""
     config = Config(motors=MotorsConfig(friction=0.0, viscous_friction=0.0, rotor_inertia=False))
     config = replace(config, controller=replace(config.controller, **controller))
-    return gains_row(config).view(GAINS)[0]
+    return gains_row(config).view(robot_state.GAINS)[0]
+
+
+GAINS = gains_of()
 
 
 def record_of(state: RobotState) -> Any:
@@ -85,7 +86,9 @@ def random_pose(rng: np.random.Generator, tilt: float = 0.3, speed: float = 1.0)
     return pose_of(np.concatenate([position, quat, joints]), v)
 
 
-def terms_of(q: Array, v: Array, payload: float = 0.0, links: Array = BODY.links) -> RigidBodyTerms:
+def terms_of(
+    q: Array, v: Array, payload: float = 0.0, links: Array = GAINS.links
+) -> RigidBodyTerms:
     """What the controller computes at Pinocchio's coordinates."""
     terms: RigidBodyTerms = rigid_body_terms(q, v, add_payload(links, payload))
     return terms

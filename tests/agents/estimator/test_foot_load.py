@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 from quadriga.agents.estimator.foot_load import update_foot_load
 from quadriga.shared.robots.conventions import GRAVITY, N_LEGS, Array
 from tests.a1 import q_stand
-from tests.agents.estimator.poses import blank, gains_of, standing_pose
-from tests.agents.estimator.test_leg_dynamics import contact_torques
+from tests.agents.estimator.poses import GAINS, blank, gains_of, standing_pose
+from tests.agents.estimator.test_rigid_body import contact_torques
 from tests.bridges.robots import real_go1_counts
 
-GAINS = gains_of()
 LOAD = 60.0  # N, on a foot that stands
 HALF_CYCLE = 200  # ticks
 SCALES = np.array([0.5, 1.0, 2.0, 4.0])  # counts per N
@@ -144,7 +143,7 @@ def test_a_sensor_that_drops_to_zero_under_load_does_not_count_for_a_tick() -> N
 def test_a_contact_by_torques_ends_at_half_the_load_that_begins_it() -> None:
     state, found = still(), []
     for share in (0.0, 0.75, 2.0, 0.75, 0.25):  # of the load that begins a contact
-        state.tau_joint = pressed(share * GAINS.contact_torque_force)
+        state.tau_joint = pressed(share * 12.0)
         for _ in range(100):
             update_foot_load(state, GAINS)
         found.append(state.foot_loaded.tolist())

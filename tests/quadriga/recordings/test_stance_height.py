@@ -23,7 +23,7 @@ CONFIG = load(
         "world.seed": 1600,
     },
 )
-HEIGHT, FILTER_MS = CONFIG.reference.height, CONFIG.controller.ground_filter_ms
+HEIGHT, FILTER_MS = CONFIG.reference.height, 50.0
 
 
 def test_errors_of_the_measured_height_are_errors_of_the_true_one() -> None:
