@@ -17,7 +17,7 @@ from mcap.opcode import Opcode
 from mcap.writer import MCAP0_MAGIC
 
 from quadriga.shared.errors import RecordingError, name_file_errors
-from quadriga.shared.recording.metadata import PROFILE, unseal
+from quadriga.shared.recording.metadata import CHANNELS, PROFILE, unseal
 from quadriga.shared.recording.reader import (
     BARE,
     CORRUPT,
@@ -87,6 +87,7 @@ class DamagedRecording:
         self.damages: list[Damage] = []
         self.metadata: dict[str, str] = {}
         self.notes: dict[str, dict[str, str]] = {}
+        self._noted: dict[int, str | None] = {}  # keys by channel
         with name_file_errors(RecordingError, path, "a recording"), path.open("rb") as file:
             try:
                 self._file = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
@@ -109,7 +110,7 @@ class DamagedRecording:
     def entries(self) -> Iterator[ChunkEntry]:
         """Every message that can be read, in the order of the file."""
         self.damages = list(self._scanned)
-        keys = self._indexed_keys()
+        keys = self._noted | self._indexed_keys()
         for at, end in self._pieces:
             try:
                 bare = self._file[at] in BARE
@@ -174,12 +175,15 @@ class DamagedRecording:
 
     def _keep(self, record: records.Metadata) -> bool:
         """Keep metadata; False if they are damaged."""
-        if record.name != PROFILE:
+        if record.name not in (PROFILE, CHANNELS):
             self.notes.setdefault(record.name, dict(record.metadata))
             return True
-        with suppress(RecordingError):
+        with suppress(RecordingError, ValueError):
             values = unseal(record.metadata, str(self.path))
-            self.metadata = self.metadata or values
+            if record.name == PROFILE:
+                self.metadata = self.metadata or values
+            else:
+                self._noted |= {int(channel): key for channel, key in values.items()}
             return True
         return False
 

@@ -120,6 +120,22 @@ def test_a_bad_chunk_is_named_and_skipped(original: Path) -> None:
     assert max(lost) <= damage.log_times[1]
 
 
+def test_the_chunk_that_declares_the_channels_is_no_need_of_the_others(tmp_path: Path) -> None:
+    """After a kill, when there is no index either."""
+    writer = RecordingWriter(tmp_path / "run.mcap", METADATA)
+    for tick in range(10):
+        for key in KEYS[:2]:
+            writer.write(key, encode(state(tick)), tick)
+        writer.flush()
+    content = bytearray((tmp_path / "run.mcap").read_bytes())
+    content[content.index(b"\x03\0\0\0lz4") + 100] ^= 1
+    writer.finish()
+    found = list(DamagedRecording(damaged(tmp_path / "run.mcap", bytes(content))).entries())
+    assert [(entry.key, entry.tick) for entry in found] == [
+        (key, tick) for tick in range(1, 10) for key in KEYS[:2]
+    ]
+
+
 def test_the_metadata_s_copy_stands_in(original: Path) -> None:
     content = bytearray(original.read_bytes())
     content[content.index(b"config_sha256") + 20] ^= 1
