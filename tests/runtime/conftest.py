@@ -21,7 +21,7 @@ from quadriga.shared.config.write import to_toml
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic, sleep
-from quadriga.shared.topic import Topic
+from quadriga.shared.topics import Topic
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import Launch, ProcessSpec, process_table
 from quadriga.warm_up import warm_up
