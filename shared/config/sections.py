@@ -481,7 +481,7 @@ class ReferenceConfig:
     trace: str = text(
         "",
         "CSV with columns t [s], vx, vy, wz that replaces these three, over and over: a path with "
-        "a '/', whose lines are stored here, separated by ';'; or a file beside the scenarios",
+        "a '/', or a file beside the scenarios; its lines are stored here, separated by ';'",
     )
     driver: str = choice(
         (CONFIGURED, BY_HAND),
