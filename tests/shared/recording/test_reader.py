@@ -77,13 +77,18 @@ def test_selection_and_decoding(tmp_path: Path) -> None:
 
 
 def test_other_readers_understand_it(tmp_path: Path) -> None:
-    """What the MCAP library itself sees: encodings, schemas, times, sequence, index."""
+    """What the MCAP library itself sees: encodings, schemas, times, sequence, index, checksums."""
     write(tmp_path / "run.mcap", 50)
     with (tmp_path / "run.mcap").open("rb") as stream:
         reader = make_reader(stream, validate_crcs=True)
         records = list(reader.iter_messages("team/r1/state"))
         summary = reader.get_summary()
         names = {metadata.name: metadata.metadata for metadata in reader.iter_metadata()}
+        stream.seek(0)
+        parts = list(StreamReader(stream, emit_chunks=True, validate_crcs=True).records)
+    assert any(isinstance(part, DataEnd) and part.data_section_crc for part in parts)
+    assert any(isinstance(part, Footer) and part.summary_crc for part in parts)
+    assert sum(isinstance(part, Chunk) for part in parts) > 1
     schema, channel, _ = records[0]
     assert schema is not None
     assert (channel.message_encoding, schema.encoding) == ("msgpack", "jsonschema")
@@ -105,15 +110,6 @@ def test_other_readers_understand_it(tmp_path: Path) -> None:
         "oversized": "0",
         "refused": "0",
     }
-
-
-def test_every_checksum_holds(tmp_path: Path) -> None:
-    write(tmp_path / "run.mcap", 100)
-    with (tmp_path / "run.mcap").open("rb") as stream:
-        records = list(StreamReader(stream, emit_chunks=True, validate_crcs=True).records)
-    assert any(isinstance(r, DataEnd) and r.data_section_crc for r in records)
-    assert any(isinstance(r, Footer) and r.summary_crc for r in records)
-    assert sum(isinstance(r, Chunk) for r in records) > 3
 
 
 def test_what_does_not_decode_is_recorded_and_counted(tmp_path: Path) -> None:
