@@ -21,21 +21,11 @@ Numbers = tuple[float, ...]
 
 
 def number(default: Any, unit: str, low: float, high: float, doc: str) -> Any:
-    """A key that is a number, or as many of them as its default has.
+    """A key that is a number within limits, or as many of them as its default has.
 
-    Args:
-        default: its value where nothing else is said; the type of all others.
-        unit: of the value; "-" or "1" without one.
-        low: least value.
-        high: greatest value.
-        doc: what it means.
+    The default also says the type of all values; the unit is "-" or "1" of what has none.
     """
     return _key(default, doc, unit=unit, low=low, high=high)
-
-
-def text(default: str, doc: str) -> Any:
-    """A key that is any text of one line."""
-    return _key(default, doc)
 
 
 def choice(choices: tuple[str, ...], doc: str, more: str = "") -> Any:
@@ -46,22 +36,19 @@ def choice(choices: tuple[str, ...], doc: str, more: str = "") -> Any:
     return _key(choices[0], doc, choices=choices, more=more)
 
 
+def text(default: str, doc: str) -> Any:
+    """A key that is any text of one line."""
+    return _key(default, doc)
+
+
 def flag(default: bool, doc: str) -> Any:
     """A key that is true or false."""
     return _key(default, doc)
 
 
-def _key(
-    default: Any,
-    doc: str,
-    unit: str = "-",
-    low: float = -inf,
-    high: float = inf,
-    choices: tuple[str, ...] = (),
-    more: str = "",
-) -> Any:
-    meta = {"doc": doc, "unit": unit, "low": low, "high": high, "choices": choices, "more": more}
-    return field(default=default, metadata=meta)
+def _key(default: Any, doc: str, **meta: Any) -> Any:
+    usual = {"unit": "-", "low": -inf, "high": inf, "choices": (), "more": ""}
+    return field(default=default, metadata={"doc": doc, **usual, **meta})
 
 
 @dataclass(frozen=True, slots=True)

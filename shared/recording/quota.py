@@ -49,25 +49,25 @@ class Quota:
 
     def admits_key(self, key: str, known: int) -> bool:
         """Whether there is room for a key in a file that has `known` of them; counts if not."""
-        room = len(self._foreign) < MAX_FOREIGN_KEYS and len(key) <= LONGEST_KEY
         own = self.is_own(key)
-        if known >= MAX_KEYS or not (own or room or key in self._foreign):
-            self.refused[REFUSED] += 1
-            return False
-        if not own:
+        room = len(self._foreign) < MAX_FOREIGN_KEYS and len(key) <= LONGEST_KEY
+        admitted = known < MAX_KEYS and (own or room or key in self._foreign)
+        if admitted and not own:
             self._foreign.add(key)
-        return True
+        self.refused[REFUSED] += not admitted
+        return admitted
 
     def admits_payload(self, size: int, *, own: bool) -> bool:
         """Whether a payload of so many bytes of an admitted key is stored; counts if not."""
-        reason = OVERSIZED if size > self._largest else ""
-        if not own and self._bytes + size > MAX_FOREIGN_BYTES:
-            reason = reason or REFUSED
-        if reason:
-            self.refused[reason] += 1
-        elif not own:
-            self._bytes += size
-        return not reason
+        counted = 0 if own else size
+        if size > self._largest:
+            self.refused[OVERSIZED] += 1
+            return False
+        if self._bytes + counted > MAX_FOREIGN_BYTES:
+            self.refused[REFUSED] += 1
+            return False
+        self._bytes += counted
+        return True
 
 
 def describe_refused(refused: Mapping[str, int]) -> list[str]:
