@@ -18,7 +18,7 @@ from mcap.writer import CompressionType, Writer
 from quadriga.shared.codec import envelope
 from quadriga.shared.errors import RecordingError, name_file_errors
 from quadriga.shared.recording.metadata import CHANNELS, COUNTS, LOST, PROFILE, SINCE, seal
-from quadriga.shared.recording.quota import Quota
+from quadriga.shared.recording.quota import OVERSIZED, REFUSED, Quota
 from quadriga.shared.recording.ticks import TickTrack, lost_by_key
 from quadriga.shared.schema import json_schema
 from quadriga.shared.topics import TABLE, find_topic
@@ -86,7 +86,7 @@ class RecordingWriter:
             self._schemas[topic.name] = self._schema(topic.type.__name__, json_schema(topic.type))
         # Bytes of what `finish` writes: the metadata, and the schemas again.
         self._end_size = 1024 + len(json.dumps(self._metadata).encode()) + self._open
-        self._channels: dict[str, tuple[int, TickTrack, bool]] = {}  # the last: of the team
+        self._channels: dict[str, tuple[int, TickTrack]] = {}
         self._new: dict[str, str] = {}  # keys by channel, not in the metadata so far
         self._periods, self._after = periods or {}, after or {}
         self._file.flush()
@@ -104,18 +104,20 @@ class RecordingWriter:
     @property
     def tracks(self) -> dict[str, TickTrack]:
         """Ticks by key."""
-        return {key: track for key, (_, track, _) in self._channels.items()}
+        return {key: track for key, (_, track) in self._channels.items()}
 
     def write(self, key: str, payload: bytes, log_time_ns: int) -> None:
         """Append one message as sent; `log_time_ns` is its reception, see `clock.log_ns`."""
         row = self._channels.get(key)
+        if len(payload) > self.quota.largest:
+            self.quota.refused[OVERSIZED] += 1
+            return
         if row is None:
-            if not self.quota.admits_key(key, len(self._channels)):
+            if not self.quota.admits(key, len(self._channels)):
+                self.quota.refused[REFUSED] += 1
                 return
             row = self._channels[key] = self._channel(key)
-        channel, track, own = row
-        if not self.quota.admits_payload(len(payload), own=own):
-            return
+        channel, track = row
         tick, publish_time = envelope(payload) or (-1, log_time_ns)
         if tick < 0:
             self.unreadable += 1
@@ -174,11 +176,11 @@ class RecordingWriter:
         self._open += MESSAGE_SIZE + len(text)
         return self._mcap.register_schema(f"{PROFILE}.{name}", "jsonschema", text)
 
-    def _channel(self, key: str) -> tuple[int, TickTrack, bool]:
+    def _channel(self, key: str) -> tuple[int, TickTrack]:
         topic, _ = find_topic(key)
         name, encoding = (topic.name, "msgpack") if topic else ("", "application/octet-stream")
         channel = self._mcap.register_channel(key, encoding, self._schemas[name])
         self._new[str(channel)] = key
         self._end_size += 4 * len(key) + 256  # in the index and in what is noted at the end
         track = TickTrack(self._periods.get(name, 0), self._after.get(key, -1))
-        return channel, track, self.quota.is_own(key)
+        return channel, track

@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 from quadriga.shared.codec import encode
-from quadriga.shared.recording import quota
 from quadriga.shared.recording.metadata import COUNTS
 from quadriga.shared.recording.quota import LARGEST, MAX_FOREIGN_KEYS, OVERSIZED, REFUSED, Quota
 from quadriga.shared.recording.reader import Recording
@@ -15,11 +14,6 @@ from quadriga.shared.recording.writer import RecordingWriter
 from tests.shared.recording.test_reader import METADATA, state
 
 OWN = "team/r1/state"
-
-
-def writer_of(path: Path) -> RecordingWriter:
-    """Of a team of one robot."""
-    return RecordingWriter(path, METADATA, quota=Quota({OWN}.__contains__))
 
 
 def test_keys_of_others_without_end_keep_no_own_message_out(tmp_path: Path) -> None:
@@ -45,22 +39,9 @@ def test_keys_of_others_without_end_keep_no_own_message_out(tmp_path: Path) -> N
     assert int(refused) == common.refused[REFUSED] == 4200 + 2 - MAX_FOREIGN_KEYS
 
 
-def test_bytes_of_others_without_end_keep_no_own_message_out(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(quota, "MAX_FOREIGN_BYTES", 100_000)
-    with writer_of(tmp_path / "run.mcap") as writer:
-        for tick in range(150):
-            writer.write("team/flood", bytes(1000), 0)
-            writer.write(OWN, encode(state(tick)), 0)
-    keys = [entry.key for entry in Recording(tmp_path / "run.mcap").entries()]
-    assert (keys.count("team/flood"), keys.count(OWN)) == (100, 150)
-    assert writer.quota.refused == {OVERSIZED: 0, REFUSED: 50}
-
-
 @pytest.mark.parametrize("key", [OWN, "team/flood"])
 def test_what_is_too_large_to_be_a_message_is_counted(tmp_path: Path, key: str) -> None:
-    with writer_of(tmp_path / "run.mcap") as writer:
+    with RecordingWriter(tmp_path / "run.mcap", METADATA) as writer:
         writer.write(key, bytes(LARGEST), 0)
         writer.write(key, bytes(LARGEST + 1), 0)
     assert writer.messages == 1
