@@ -174,7 +174,8 @@ class RecordingWriter:
     def _schema(self, name: str, schema: Mapping[str, Any]) -> int:
         text = json.dumps(schema, ensure_ascii=False).encode()
         self._open += MESSAGE_SIZE + len(text)
-        return self._mcap.register_schema(f"{PROFILE}.{name}", "jsonschema", text)
+        schema_id: int = self._mcap.register_schema(f"{PROFILE}.{name}", "jsonschema", text)
+        return schema_id
 
     def _channel(self, key: str) -> tuple[int, TickTrack]:
         topic, _ = find_topic(key)
