@@ -13,7 +13,6 @@ from quadriga.shared.config.reference_trace import Trace, trace_of
 from quadriga.shared.config.sections import Config, ReferenceConfig
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.runtime.places import scenario_folder
 
 GOOD = "# a comment\nt,vx,vy,wz\n0,0,0,0\n1.0,0.4,0.1,-0.2\n2.0,0.4,0.0,0.0\n4.0,0,0,0\n"
 
@@ -76,17 +75,6 @@ def test_what_is_no_trace_is_one_clear_error(tmp_path: Path, text: str, message:
     path.unlink()
     with pytest.raises(ConfigError, match="No such file"):
         traced(path)
-
-
-def test_the_joystick_of_the_scenarios_is_smooth_and_moderate() -> None:
-    trace = traced("joystick.csv")
-    assert (scenario_folder() / "joystick.csv").is_file()
-    assert trace.t[-1] >= 20.0
-    assert (np.abs(trace.v).max(axis=0) <= [0.5, 0.2, 0.3]).all()
-    assert (trace.v.std(axis=0) > [0.1, 0.05, 0.08]).all()
-    rate = np.diff(trace.v, axis=0) / np.diff(trace.t)[:, None]
-    assert np.abs(rate).max() < 0.5  # m/s² and rad/s²
-    np.testing.assert_array_equal(trace.v[[0, -1]], 0.0)
 
 
 def test_a_configuration_holds_what_the_file_says_and_needs_it_no_more(good: Path) -> None:

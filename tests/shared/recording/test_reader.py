@@ -161,15 +161,12 @@ def test_a_cut_file_is_read_up_to_the_cut(tmp_path: Path, share: float) -> None:
 
 
 def test_errors_name_the_file(tmp_path: Path) -> None:
-    missing, empty, foreign = (tmp_path / f"{name}.mcap" for name in ("no", "empty", "foreign"))
-    empty.write_bytes(b"")
-    foreign.write_bytes(b"PK\x03\x04 a zip")
-    for path, got in ((missing, "No such file"), (empty, "empty"), (foreign, "not start as MCAP")):
-        with pytest.raises(RecordingError, match=got) as caught:
-            Recording(path)
-        assert str(path) in str(caught.value)
+    path = tmp_path / "empty.mcap"
+    path.write_bytes(b"")
+    with pytest.raises(RecordingError, match=r"empty\.mcap: got an empty"):
+        Recording(path)
     with pytest.raises(RecordingError, match="a new one"):
-        RecordingWriter(empty, METADATA)
+        RecordingWriter(path, METADATA)
     with pytest.raises(RecordingError, match="writable folder"):
         RecordingWriter(Path("/proc/no/folder/run.mcap"), METADATA)
 
