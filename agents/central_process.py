@@ -22,6 +22,7 @@ from quadriga.shared.bus.session import POLL, READY, Bus
 from quadriga.shared.codec import decode, encode
 from quadriga.shared.codes import code_of
 from quadriga.shared.config.sections import Config
+from quadriga.shared.config.timing import PEER_TIMEOUT
 from quadriga.shared.errors import MessageError
 from quadriga.shared.members import PLANNER
 from quadriga.shared.messages import Event, Measurement, Reference, Status
@@ -117,7 +118,7 @@ class _CentralShell:
 
     @property
     def _patience(self) -> float:
-        return self._config.planner.peer_timeout if self._lockstep else 0.0
+        return PEER_TIMEOUT if self._lockstep else 0.0
 
     def _reference_known(self, state: CentralState, step: int) -> bool:
         """Whether the operator's reference for the time of `step` has arrived."""

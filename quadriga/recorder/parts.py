@@ -13,7 +13,7 @@ from quadriga.shared.errors import RecordingError
 from quadriga.shared.recording.quota import Quota
 from quadriga.shared.recording.reader import name_of
 from quadriga.shared.recording.ticks import lost_by_key
-from quadriga.shared.recording.writer import MESSAGE_SIZE, RecordingWriter
+from quadriga.shared.recording.writer import CHUNK_KIB, MESSAGE_SIZE, RecordingWriter
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.topics import STATE
 
@@ -44,11 +44,11 @@ class Parts:
         self,
         path: Path,
         metadata: Mapping[str, str],
-        chunk_kib: int,
         periods: Mapping[str, int],
         limits: Limits = Limits(),
         now: Callable[[], float] = monotonic,
         quota: Quota | None = None,
+        chunk_kib: int = CHUNK_KIB,
     ) -> None:
         """Create the first file.
 

@@ -398,7 +398,6 @@ class PlannerConfig:
     )
     max_peer_age: int = number(3, "planning steps", 1, 25, "an older plan of a peer is not shifted")
     hold_steps: int = number(5, "planning steps", 0, 250, "how long a lost peer's terms are held")
-    peer_timeout: float = number(5.0, "s wall", 0.01, 10.0, "lockstep: wait for a peer's plan")
 
     @property
     def option_values(self) -> Mapping[str, float]:
@@ -424,7 +423,6 @@ class IdentificationConfig:
         "force noise of a robot's feet together, of either sign, at each stance foot: along x, y, "
         "z, vertical couple, horizontal couple",
     )
-    noise_hold_ms: int = number(20, "ms", 10, 500, "how long one draw of noise is held")
     vx: Numbers = number((-0.2, 0.7), "m/s", -2.0, inf, "range of random forward speeds")
     vy: Numbers = number((-0.2, 0.2), "m/s", -2.0, inf, "range of random sideways speeds")
     wz: Numbers = number((-0.3, 0.3), "rad/s", -2.0, inf, "range of random yaw rates")
@@ -484,7 +482,6 @@ class RecorderConfig:
     """The recording of all traffic."""
 
     enabled: bool = flag(True, "the team waits for the recorder before it walks")
-    chunk_kib: int = number(256, "KiB", 16, 65536, "largest MCAP chunk; closed after 50 ms anyway")
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,7 +32,7 @@ from quadriga.shared.topics import TABLE, find_topic, topic_of
 M = TypeVar("M", bound=Message)
 
 RECORD: Final = struct.Struct("<BQ")  # opcode, length
-LARGEST_CHUNK: Final = 1 << 27  # bytes unpacked; `recorder.chunk_kib` is half of that at most
+LARGEST_CHUNK: Final = 1 << 27  # bytes unpacked
 # What the MCAP library, LZ4 and Zstandard raise on bytes that are no record.
 CORRUPT: Final = (
     *(McapError, struct.error, ValueError, RuntimeError, IndexError, EOFError, MemoryError),

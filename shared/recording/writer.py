@@ -25,6 +25,7 @@ from quadriga.shared.topics import TABLE, find_topic
 
 # Bytes that a message takes at most in a file beside its payload, in chunk and index.
 MESSAGE_SIZE: Final = 64
+CHUNK_KIB: Final = 256  # largest chunk; the recorder closes one after 50 ms anyway
 _CHUNK_SIZE: Final = 256  # bytes of a chunk's index without its channels, and with each of them
 _PER_CHANNEL: Final = 16
 
@@ -45,7 +46,7 @@ class RecordingWriter:
         self,
         path: Path,
         metadata: Mapping[str, str],
-        chunk_kib: int = 256,
+        chunk_kib: int = CHUNK_KIB,
         *,
         periods: Mapping[str, int] | None = None,
         after: Mapping[str, int] | None = None,
