@@ -135,7 +135,7 @@ class Recording:
         """
         if not self.complete:
             raise self._damage_error(f"a file that is cut after {self._size:,} bytes")
-        content = np.memmap(self.path, np.uint8, "r")
+        content = np.memmap(self.path, np.uint8, "r").data
         footer_at = max(self._size - len(MCAP0_MAGIC) - _FOOTER, 0)
         footer = Footer.read(stream(content[footer_at + RECORD.size :].tobytes()))
         start = footer.summary_start or footer_at  # 0: no summary
