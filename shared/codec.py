@@ -10,7 +10,6 @@ from __future__ import annotations
 import struct
 from collections.abc import Mapping
 from dataclasses import fields
-from functools import cache
 from math import isfinite, prod
 from typing import Any, Final, TypeVar
 
@@ -145,7 +144,14 @@ class _Layout:
         self.flat = _FlatLayout(kind) if issubclass(kind, Flat) else None
 
 
-_layout: Final = cache(_Layout)
+def _layout(kind: type[Message]) -> _Layout:
+    found = _LAYOUTS.get(kind)
+    if found is None:
+        found = _LAYOUTS[kind] = _Layout(kind)
+    return found
+
+
+_LAYOUTS: Final[dict[type[Message], _Layout]] = {}
 
 
 class _FlatLayout:
