@@ -21,6 +21,7 @@ from quadriga.shared.bus.session import POLL, READY, Bus
 from quadriga.shared.codec import decode, encode
 from quadriga.shared.codes import code_of
 from quadriga.shared.config.sections import Config
+from quadriga.shared.config.timing import PEER_TIMEOUT
 from quadriga.shared.errors import MessageError
 from quadriga.shared.members import PLANNER
 from quadriga.shared.messages import Event, Measurement, Reference, Status
@@ -83,7 +84,7 @@ class _CentralShell:
         keys = {name: PLAN.key(team, name) for name in names} | {"": STATUS.key(team, PLANNER)}
         self._put = {n: bus.publisher(key, droppable=realtime) for n, key in keys.items()}
         self._lead = Liveness(bus, config)
-        self._patience = 0.0 if realtime else config.planner.peer_timeout
+        self._patience = 0.0 if realtime else PEER_TIMEOUT
         self._references: list[Reference] = []
         self._measurements: list[tuple[str, Measurement]] = []
         self._counters: Counter[str] = Counter()

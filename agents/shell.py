@@ -16,6 +16,7 @@ from quadriga.shared.bus.liveness import Liveness
 from quadriga.shared.bus.session import HERE, POLL, READY, Bus
 from quadriga.shared.codec import encode
 from quadriga.shared.config.sections import Config
+from quadriga.shared.config.timing import PEER_TIMEOUT
 from quadriga.shared.messages import State
 from quadriga.shared.modes import Mode
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns
@@ -177,7 +178,7 @@ class AgentShell(Generic[S]):
         A source that is silent for the time-out is not waited for again until it sends a message.
         """
         if self._lockstep and expected is not NOTHING:
-            deadline = monotonic() + self._config.planner.peer_timeout
+            deadline = monotonic() + PEER_TIMEOUT
             missing = self._missing_sources(state.tick, expected)
             while missing:
                 left = deadline - monotonic()

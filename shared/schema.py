@@ -14,8 +14,7 @@ from hashlib import sha256
 from typing import Any
 
 from quadriga.shared.messages import Message
-from quadriga.shared.topic import CONFIGURED, Topic
-from quadriga.shared.topics import TABLE
+from quadriga.shared.topics import CONFIGURED, TABLE, Topic
 
 _PLAIN: dict[type, str] = {
     **{bool: "boolean", int: "integer", float: "number"},

@@ -1,20 +1,16 @@
-"""The table of topics: key, message type, period, maximum age, who sends it and who takes it.
-
-Other packages add rows of their own, see `shared.topic.plugin_topics`.
-"""
+"""The table of topics: key, message type, period, maximum age, who sends it and who takes it."""
 
 from __future__ import annotations
 
+from dataclasses import KW_ONLY, dataclass
 from typing import Final
 
 from quadriga.shared import members
 from quadriga.shared import messages as msg
 from quadriga.shared.errors import MessageError
 from quadriga.shared.members import AGENT, LAUNCHER, OPERATOR, PLANNER, SIM
-from quadriga.shared.topic import CONFIGURED as CONFIGURED
-from quadriga.shared.topic import Topic as Topic
-from quadriga.shared.topic import plugin_topics
 
+CONFIGURED: Final = -1  # a time that the configuration says: see `quadriga.shared.config.timing`
 SAMPLE_MS: Final = 10  # one sample of u and y: forces are means over it, outputs taken at its end
 REFERENCE_EPOCH_MS: Final = 100  # the operator speaks at multiples of this
 STATUS_MS: Final = 100  # so often an agent gives account of itself in lock-step
@@ -23,6 +19,40 @@ RECEIVED: Final = "received"  # ends the key of the question whether all before 
 _PLANS: Final = (AGENT, PLANNER)  # who plans
 # Processes that say one word to a team, and see what comes of it.
 _SPEAKERS: Final = (members.ESTOP, members.STOP, members.RESET, members.RESUME)
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """One row of the table.
+
+    Attributes:
+        name: last part of the key; `per_robot` tells whether a robot's name stands before it.
+        type: the message's dataclass.
+        senders: roles whose processes publish it.
+        receivers: roles whose processes act on it, the recorder aside.
+        per_robot: whether every robot has one of its own.
+        period_ms: world time between two of them; 0: sent on event; or `CONFIGURED`.
+        max_age_ms: longest gap between two of them, in world time, that is nothing unusual; of a
+            reference also how long it is obeyed. 0: none; or `CONFIGURED`.
+        recorded: whether it is part of a recording of everything.
+        repeats: whether several may be of one tick.
+    """
+
+    name: str
+    type: type[msg.Message]
+    senders: tuple[str, ...]
+    receivers: tuple[str, ...]
+    _: KW_ONLY
+    per_robot: bool = False
+    period_ms: int
+    max_age_ms: int = 0
+    recorded: bool = True
+    repeats: bool = False
+
+    def key(self, team: str, robot: str = "") -> str:
+        """The Zenoh key of this topic; `robot` may be `*`."""
+        return f"{team}/{robot}/{self.name}" if self.per_robot else f"{team}/{self.name}"
+
 
 STATE: Final = Topic(
     "state", msg.State, (SIM,), (AGENT, SIM), per_robot=True, period_ms=1, max_age_ms=20
@@ -82,11 +112,10 @@ POSTURE: Final = Topic(
     "posture", msg.State, (SIM,), (), per_robot=True, period_ms=SAMPLE_MS, recorded=False
 )
 
-_OWN: Final = (
+TABLE: Final = (
     STATE, COMMAND, MEASUREMENT, PLAN, STATUS, INPUTS, REFERENCE, *REQUESTS, LIVE_FAULT, TRUTH,
     EVENT, AGENT_EVENT, INJECTED, CLOCK, POSTURE,
 )  # fmt: skip
-TABLE: Final = (*_OWN, *plugin_topics(_OWN))
 _BY_NAME: Final = {topic.name: topic for topic in TABLE}
 
 

@@ -22,8 +22,7 @@ from quadriga.shared.errors import MessageError
 from quadriga.shared.messages import EStop, Event, Message, Reset, Resume, SafeStop, Status
 from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic_ns
-from quadriga.shared.topic import Topic
-from quadriga.shared.topics import ESTOP, EVENT, RESET, RESUME, STATUS, STOP
+from quadriga.shared.topics import ESTOP, EVENT, RESET, RESUME, STATUS, STOP, Topic
 
 _MOVES: Final = frozenset((words.GO_ON, words.RESET))  # has robots get up, or walk
 _MOST_EVENTS: Final = 1000  # since the last emergency stop; more can only be a flood

@@ -36,6 +36,7 @@ _DISTURBANCES: Final[tuple[Mapping[str, Any], ...]] = (
 _LEAST_EPISODE_S = 3.0  # a walk that ended in a fall earlier is not worth keeping
 _BEFORE_FALL = 50  # samples cut off before a fall
 _CLIP = 2.5  # standard deviations of the force noise
+_NOISE_HOLD_MS: Final = 20  # how long one draw of noise is held
 N_COMPONENTS = 5  # of a net wrench that two feet on a diagonal can exert
 _RAMP_MS = 500  # from one random speed to the next: jumps would drown what the forces do
 
@@ -150,8 +151,7 @@ class _RandomWalk:
         low, high = np.array([ident.vx, ident.vy, ident.wz]).T
         self._speeds = random.uniform(low, high, size=(draws, 3))
         self._speeds[0] = 0.0
-        self._noise_hold = ident.noise_hold_ms
-        shape = (ticks // self._noise_hold + 2, config.team.robots, 4, 3)
+        shape = (ticks // _NOISE_HOLD_MS + 2, config.team.robots, 4, 3)
         noise = np.clip(random.normal(size=shape), -_CLIP, _CLIP) * np.array(ident.noise)
         together = random.choice([-1.0, 1.0], (*shape[:2], N_COMPONENTS)) * ident.wrench_noise
         patterns = force_patterns(config.robot.feet_under_hips)
@@ -173,7 +173,7 @@ class _RandomWalk:
 
     def excitation(self, robot: str, tick: int) -> Array:
         """Force noise of a robot at a tick. Shape (12,), N."""
-        noise: Array = self._noise[tick // self._noise_hold, self._index[robot]]
+        noise: Array = self._noise[tick // _NOISE_HOLD_MS, self._index[robot]]
         return noise
 
 

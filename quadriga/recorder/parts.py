@@ -7,17 +7,15 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, Self
+from typing import Self
 
 from quadriga.shared.errors import RecordingError
 from quadriga.shared.recording.quota import Quota
 from quadriga.shared.recording.reader import name_of
 from quadriga.shared.recording.ticks import lost_by_key
-from quadriga.shared.recording.writer import RecordingWriter
+from quadriga.shared.recording.writer import CHUNK_KIB, MESSAGE_SIZE, RecordingWriter
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.topics import STATE
-
-_RECORD: Final = 64  # bytes that a message takes at most in a file beside its payload
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,11 +44,11 @@ class Parts:
         self,
         path: Path,
         metadata: Mapping[str, str],
-        chunk_kib: int,
         periods: Mapping[str, int],
         limits: Limits = Limits(),
         now: Callable[[], float] = monotonic,
         quota: Quota | None = None,
+        chunk_kib: int = CHUNK_KIB,
     ) -> None:
         """Create the first file.
 
@@ -73,7 +71,11 @@ class Parts:
     def write(self, key: str, payload: bytes, log_time_ns: int) -> None:
         """Append one message as sent."""
         size = self._limits.size
-        if size and self._writer.messages and self._writer.size + len(payload) + _RECORD > size:
+        if (
+            size
+            and self._writer.messages
+            and self._writer.size + len(payload) + MESSAGE_SIZE > size
+        ):
             self._begin_next()
         self._writer.write(key, payload, log_time_ns)
 

@@ -115,14 +115,7 @@ def run(
 def _open_parts(
     config: Config, path: Path, about: Mapping[str, str], selection: Selection, keys: KeyFilter
 ) -> Parts:
-    return Parts(
-        path,
-        about,
-        config.recorder.chunk_kib,
-        periods(config),
-        selection.limits,
-        quota=Quota(keys.own.__contains__),
-    )
+    return Parts(path, about, periods(config), selection.limits, quota=Quota(keys.own.__contains__))
 
 
 def _schedule(config: Config) -> None:

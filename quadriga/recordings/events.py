@@ -11,8 +11,7 @@ from quadriga.shared.errors import MessageError
 from quadriga.shared.members import LAUNCHER
 from quadriga.shared.messages import Event
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.topic import Topic
-from quadriga.shared.topics import AGENT_EVENT, EVENT, INJECTED, topic_of
+from quadriga.shared.topics import AGENT_EVENT, EVENT, INJECTED, Topic, topic_of
 
 _NAMES: Final = frozenset((EVENT.name, AGENT_EVENT.name, INJECTED.name))
 

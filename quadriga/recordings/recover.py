@@ -105,7 +105,7 @@ def format_recovery(recovery: Recovery) -> list[str]:
     of = f" of {recovery.expected:,}" if recovery.expected is not None else ""
     lines = [f"{recovery.out}: {recovery.messages:,}{of} messages recovered"]
     lines += ["unreadable"] if recovery.damages else []
-    lines += [f"  {damage}{_format_duration(damage)}" for damage in recovery.damages]
+    lines += [f"  {damage}" for damage in recovery.damages]
     if not recovery.damages:
         lines.append("unreadable: nothing but the index or a checksum")
     if not recovery.has_metadata:
@@ -132,15 +132,6 @@ def _format_gaps(track: TickTrack) -> tuple[str, str]:
     more = len(track.gaps) - _GAPS
     text = f"between ticks {', '.join(spans)}" + (f" and {more} more" if more > 0 else "")
     return f"{track.lost:,}", text
-
-
-def _format_duration(damage: Damage) -> str:
-    if damage.log_times is None:
-        return ""
-    first, last = damage.log_times
-    if not 0 < first <= last < first + 10**12:  # the times themselves are damaged
-        return ""
-    return f", {(last - first) / 1e9:.3f} s of wall time"
 
 
 def _describe_source(source: DamagedRecording, path: Path) -> dict[str, str]:

@@ -15,8 +15,7 @@ from quadriga.shared.members import AGENT, SIM
 from quadriga.shared.messages import Event, Message, Status
 from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic
-from quadriga.shared.topic import Topic
-from quadriga.shared.topics import EVENT, STATUS, topics_for
+from quadriga.shared.topics import EVENT, STATUS, Topic, topics_for
 
 SEARCH: Final = 5.0  # s, longest search for the team
 _AGAIN, _OFTEN_FOR = 0.1, 1.0  # s: how often a word is said again at first, and for how long

@@ -13,7 +13,6 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
 from quadriga.shared.messages import Event, Status
 from quadriga.shared.runtime.clock import Rate, monotonic
-from quadriga.shared.topic import Topic
 from quadriga.shared.topics import (
     AGENT_EVENT,
     COMMAND,
@@ -26,6 +25,7 @@ from quadriga.shared.topics import (
     STATE,
     STATUS,
     TRUTH,
+    Topic,
 )
 from quadriga.view.gather import Gatherer
 from quadriga.view.port import PageAddress, url_of

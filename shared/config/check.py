@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from typing import Final
 
 from quadriga.shared.agent_command import parse_line
 from quadriga.shared.config.endpoints import check_port
 from quadriga.shared.config.per_robot import carriers, friction_of_robots
-from quadriga.shared.config.sections import BRIDGED, SIMULATED, Config, PlannerConfig, WorldConfig
+from quadriga.shared.config.sections import BRIDGED, SIMULATED, Config
 from quadriga.shared.config.terrains import TERRAINS
+from quadriga.shared.config.timing import PEER_TIMEOUT
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.planner_kinds import NO_PLANNER, find_kind, read_options
 from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.topics import SAMPLE_MS
 
 _TEAM_NAME: Final = re.compile(r"[A-Za-z0-9_.-]{1,64}")
-_RANGES: Final = ("vx", "vy", "wz", "gain_range")  # of [identification]
+_EACH: Final = "team.plant_per_robot"
 _ANSWER: Final = 1.0  # s wall, for a robot's step once it has waited for a peer in vain
+
+Rule = tuple[bool, str, str, str, str]  # whether it is broken; key, got, expected and cause
 
 
 def check(config: Config) -> None:
@@ -26,118 +30,98 @@ def check(config: Config) -> None:
     Raises:
         ConfigError: a rule is broken; the first one that is.
     """
-    name = config.team.name
-    if not _TEAM_NAME.fullmatch(name):
-        expected, cause = "1 to 64 letters, digits, . _ or -", "it is the first part of every key"
-        raise ConfigError("team.name", repr(name), expected, cause)
+    for rules in (_keys, _planner, _plants):
+        for is_broken, *error in rules(config):
+            if is_broken:
+                raise ConfigError(*error)
+
+
+def _keys(config: Config) -> Iterator[Rule]:
+    team, world, motors, ident = config.team, config.world, config.motors, config.identification
+    expected, cause = "1 to 64 letters, digits, . _ or -", "it is the first part of every key"
+    yield not _TEAM_NAME.fullmatch(team.name), "team.name", repr(team.name), expected, cause
     check_port("bus.endpoint", config.bus.endpoint)
     for key in ("stance_ms", "stand_ms"):
-        if (value := getattr(config.gait, key)) % SAMPLE_MS:
-            raise ConfigError(f"gait.{key}", str(value), f"a multiple of {SAMPLE_MS} ms")
-    _check_world(config.world, robot_names(config.team.robots))
-    _check_models(config)
-    _check_planner(config.planner, config.world)
-    _check_plants(config)
-    _check_agent_command(config)
-    _check_identification(config)
-
-
-def _check_world(world: WorldConfig, names: tuple[str, ...]) -> None:
+        value = getattr(config.gait, key)
+        expected = f"a multiple of {SAMPLE_MS} ms"
+        yield value % SAMPLE_MS != 0, f"gait.{key}", str(value), expected, ""
+    names = robot_names(team.robots)
     carriers(world.payload_on, names)
     friction_of_robots(world.friction_of, world.friction, names)
     for push in filter(None, world.push.split(",")):
         robot = push.partition(":")[0].strip()
-        if robot not in ("all", *names):
-            expected = f"all or one of {', '.join(names)}"
-            raise ConfigError("world.push", f"a push on {robot!r}", expected)
-    if world.command_damp_ms < world.command_hold_ms:
-        expected = f"at least world.command_hold_ms = {world.command_hold_ms}"
-        raise ConfigError("world.command_damp_ms", str(world.command_damp_ms), expected)
+        expected = f"all or one of {', '.join(names)}"
+        yield robot not in ("all", *names), "world.push", f"a push on {robot!r}", expected, ""
+    hold, damp = world.command_hold_ms, world.command_damp_ms
+    expected = f"at least world.command_hold_ms = {hold}"
+    yield damp < hold, "world.command_damp_ms", str(damp), expected, ""
     terrain = TERRAINS[world.terrain]
-    height = getattr(world, terrain.height_key)
-    if height < terrain.least_height:
-        expected = f"at least {terrain.least_height:g} m for terrain {terrain.name!r}"
-        raise ConfigError(f"world.{terrain.height_key}", f"{height:g}", expected)
-
-
-def _check_models(config: Config) -> None:
-    """Friction needs inertia."""
-    motors = config.motors
+    height, least = getattr(world, terrain.height_key), terrain.least_height
+    expected = f"at least {least:g} m for terrain {terrain.name!r}"
+    yield height < least, f"world.{terrain.height_key}", f"{height:g}", expected, ""
     friction = max(motors.friction, motors.viscous_friction)
-    if friction > 0.0 and not motors.rotor_inertia:
-        got, expected = f"false with joint friction of {friction:g}", "true, or no joint friction"
-        cause = "friction of light joints turns their rates around at every tick"
-        raise ConfigError("motors.rotor_inertia", got, expected, cause)
+    got, expected = f"false with joint friction of {friction:g}", "true, or no joint friction"
+    cause = "friction of light joints turns their rates around at every tick"
+    yield friction > 0 and not motors.rotor_inertia, "motors.rotor_inertia", got, expected, cause
+    for key in ("vx", "vy", "wz", "gain_range"):
+        first, last = getattr(ident, key)
+        got = f"[{first}, {last}]"
+        yield first > last, f"identification.{key}", got, "[least, greatest]", ""
+    is_broken = bool(ident.response) and ident.predictor != "periodic"
+    got, expected = f"{ident.response!r} with {ident.predictor!r}", "predictor 'periodic'"
+    cause = "no other is made of responses to single forces"
+    yield is_broken, "identification.response", got, expected, cause
 
 
-def _check_planner(planner: PlannerConfig, world: WorldConfig) -> None:
+def _planner(config: Config) -> Iterator[Rule]:
     """The kind is installed; plans reach from one to the next; a peer is waited for."""
+    planner, world, line = config.planner, config.world, config.team.agent_command
     kind = find_kind(planner.kind)
     read_options(kind, planner.options)
-    if planner.applied > planner.N:
-        expected = f"at most planner.N = {planner.N}"
-        raise ConfigError("planner.applied", str(planner.applied), expected)
-    if not kind.publishes:
-        return
-    if -1.0 < planner.damping < 0.0:
-        raise ConfigError("planner.damping", f"{planner.damping:g}", "-1, or 0 … 0.95")
-    if planner.cost == "team" and kind.needs_peers and planner.output_bounds != "none":
-        got = f"{planner.output_bounds!r} with planner.cost 'team'"
-        cause = "each agent would plan with bounds that its peers do not know"
-        raise ConfigError("planner.output_bounds", got, "'none', or planner.cost = 'own'", cause)
-    latency = max(1, planner.latency_ms) if kind.central else planner.latency_ms
-    longest = SAMPLE_MS * (planner.N - planner.applied)
-    if latency > longest:
-        expected = f"at most {SAMPLE_MS}·(planner.N − planner.applied) = {longest} ms"
-        cause = "a plan would have run out before the next one takes effect"
-        raise ConfigError("planner.latency_ms", str(planner.latency_ms), expected, cause)
-    least = planner.peer_timeout + _ANSWER
-    if world.mode == "lockstep" and world.command_timeout < least:
-        expected = f"at least planner.peer_timeout + {_ANSWER:g} s = {least:g} s"
-        cause = "else robots that wait for a frozen peer's plan count as frozen too"
-        raise ConfigError("world.command_timeout", f"{world.command_timeout:g}", expected, cause)
-
-
-def _check_plants(config: Config) -> None:
-    """What plants of a robot each cannot do: wait, be yoked in simulation, or know all truth."""
-    team, each = config.team, "team.plant_per_robot"
-    if team.plant == BRIDGED and not team.plant_per_robot:
-        cause = "every robot has a bridge of its own"
-        raise ConfigError(each, f"false with plant {BRIDGED!r}", "true", cause)
-    if team.plant_per_robot and config.world.mode != "realtime":
-        cause = "plants of one robot go by the clock and wait for nobody"
-        expected = f"'realtime', or {each} = false"
-        raise ConfigError("world.mode", f"'lockstep' with {each} = true", expected, cause)
-    if team.plant_per_robot and config.estimator.kind == "truth":
-        cause = "the plant of one robot does not know where all are"
-        expected = f"'kalman', or {each} = false"
-        raise ConfigError("estimator.kind", f"'truth' with {each} = true", expected, cause)
-    simulated = team.plant == SIMULATED and team.plant_per_robot
-    if simulated and team.robots > 1 and team.yokes != "none":
-        got = f"true with simulated robots and {team.yokes!r} yokes"
-        expected = f"team.yokes = 'none', or {each} = false"
-        cause = "robots that are simulated in worlds of their own cannot pull at each other"
-        raise ConfigError(each, got, expected, cause)
-
-
-def _check_agent_command(config: Config) -> None:
-    """A program of one's own has a command line, and nobody else plans for its robots."""
-    line, kind = config.team.agent_command, config.planner.kind
     if line:
         parse_line(line)
-    if line and kind != NO_PLANNER:
-        got = f"{kind!r} with team.agent_command {line!r}"
-        cause = "a program of one's own takes the place of agents and planners"
-        raise ConfigError("planner.kind", got, repr(NO_PLANNER), cause)
+    got = f"{planner.kind!r} with team.agent_command {line!r}"
+    cause = "a program of one's own takes the place of agents and planners"
+    is_broken = bool(line) and planner.kind != NO_PLANNER
+    yield is_broken, "planner.kind", got, repr(NO_PLANNER), cause
+    expected = f"at most planner.N = {planner.N}"
+    yield planner.applied > planner.N, "planner.applied", str(planner.applied), expected, ""
+    if not kind.publishes:
+        return
+    is_broken = -1.0 < planner.damping < 0.0
+    yield is_broken, "planner.damping", f"{planner.damping:g}", "-1, or 0 … 0.95", ""
+    is_broken = planner.cost == "team" and kind.needs_peers and planner.output_bounds != "none"
+    got = f"{planner.output_bounds!r} with planner.cost 'team'"
+    cause = "each agent would plan with bounds that its peers do not know"
+    yield is_broken, "planner.output_bounds", got, "'none', or planner.cost = 'own'", cause
+    latency = max(1, planner.latency_ms) if kind.central else planner.latency_ms
+    longest = SAMPLE_MS * (planner.N - planner.applied)
+    expected = f"at most {SAMPLE_MS}·(planner.N − planner.applied) = {longest} ms"
+    cause = "a plan would have run out before the next one takes effect"
+    yield latency > longest, "planner.latency_ms", str(planner.latency_ms), expected, cause
+    least = PEER_TIMEOUT + _ANSWER
+    is_broken = world.mode == "lockstep" and world.command_timeout < least
+    expected = f"at least {least:g} s"
+    cause = "else robots that wait for a frozen peer's plan count as frozen too"
+    yield is_broken, "world.command_timeout", f"{world.command_timeout:g}", expected, cause
 
 
-def _check_identification(config: Config) -> None:
-    ident = config.identification
-    for key in _RANGES:
-        first, last = getattr(ident, key)
-        if first > last:
-            raise ConfigError(f"identification.{key}", f"[{first}, {last}]", "[least, greatest]")
-    if ident.response and ident.predictor != "periodic":
-        got, expected = f"{ident.response!r} with {ident.predictor!r}", "predictor 'periodic'"
-        cause = "no other is made of responses to single forces"
-        raise ConfigError("identification.response", got, expected, cause)
+def _plants(config: Config) -> Iterator[Rule]:
+    """What plants of a robot each cannot do: wait, be yoked in simulation, or know all truth."""
+    team, each = config.team, config.team.plant_per_robot
+    is_broken = team.plant == BRIDGED and not each
+    cause = "every robot has a bridge of its own"
+    yield is_broken, _EACH, f"false with plant {BRIDGED!r}", "true", cause
+    is_broken = each and config.world.mode != "realtime"
+    expected = f"'realtime', or {_EACH} = false"
+    cause = "plants of one robot go by the clock and wait for nobody"
+    yield is_broken, "world.mode", f"'lockstep' with {_EACH} = true", expected, cause
+    is_broken = each and config.estimator.kind == "truth"
+    expected = f"'kalman', or {_EACH} = false"
+    cause = "the plant of one robot does not know where all are"
+    yield is_broken, "estimator.kind", f"'truth' with {_EACH} = true", expected, cause
+    is_broken = each and team.plant == SIMULATED and team.robots > 1 and team.yokes != "none"
+    got = f"true with simulated robots and {team.yokes!r} yokes"
+    expected = f"team.yokes = 'none', or {_EACH} = false"
+    cause = "robots that are simulated in worlds of their own cannot pull at each other"
+    yield is_broken, _EACH, got, expected, cause

@@ -61,7 +61,7 @@ def overlay(given: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str,
 
     A preset among the overrides also replaces what `given` says of the keys that presets set, so
     that a file with every key written out can be walked with another one; an agent's command
-    replaces its kind of planner. The path of a trace gives way to what the file says.
+    replaces its kind of planner. The name of a trace gives way to what the file says.
 
     Raises:
         ConfigError: an override names no key, or there is no such trace.
@@ -82,8 +82,8 @@ def overlay(given: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str,
             raise ConfigError(name, "a value", "section.key")
         merged[section][key] = value
     trace = flatten(merged).get("reference.trace")
-    if isinstance(trace, str) and "/" in trace and ROW_END not in trace:
-        merged["reference"]["trace"] = inline_trace(Path(trace))
+    if isinstance(trace, str) and trace.isprintable() and trace and ROW_END not in trace:
+        merged["reference"]["trace"] = inline_trace(trace)
     return merged
 
 

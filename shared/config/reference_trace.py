@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import hashlib
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -20,7 +19,6 @@ COLUMNS: Final = ("t", "vx", "vy", "wz")
 ROW_END: Final = ";"  # where a trace stands in a configuration, in one line
 _KEY: Final = "reference.trace"
 _STREAM: Final = 6  # of the seed
-_READABLE: Final = "a file that can be read"
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,61 +46,36 @@ def trace_of(config: Config) -> Trace | None:
     """The trace of a configuration, None if it has none.
 
     Raises:
-        ConfigError: the file cannot be read, or is no trace.
+        ConfigError: it is no trace.
     """
     asked = config.reference
     if not asked.trace:
         return None
-    path = _trace_file(config)
     begin = np.random.default_rng((config.world.seed, _STREAM)).uniform(0.0, asked.trace_shift)
-    return _read_trace(path, asked.trace if path is None else "", begin)
+    return _parse_trace(asked.trace, begin)
 
 
-def trace_sha256(config: Config) -> str:
-    """Digest of the trace's file, empty where the configuration holds more than its name.
-
-    Raises:
-        ConfigError: the file cannot be read.
-    """
-    path = _trace_file(config)
-    with name_file_errors(ConfigError, f"{_KEY} {path}", _READABLE):
-        return "" if path is None else hashlib.sha256(path.read_bytes()).hexdigest()
-
-
-def inline_trace(path: Path) -> str:
+def inline_trace(name: str) -> str:
     """A trace's file as one line, as `reference.trace` holds it: nothing then depends on the file.
+
+    Args:
+        name: a path with a `/`, or a file beside the scenarios.
 
     Raises:
         ConfigError: the file cannot be read, or is no trace.
     """
-    rows = _split_rows(_read_text(path))
+    path = Path(name) if "/" in name else scenario_folder() / name
+    with name_file_errors(ConfigError, f"{_KEY} {path}", "a file that can be read"):
+        rows = _split_rows(path.read_text(encoding="utf-8-sig"))  # as spreadsheets write it
     _parse_values(f"{_KEY} {path}", rows)
     return ROW_END.join(",".join(row) for row in rows)
 
 
-def _trace_file(config: Config) -> Path | None:
-    """The file of a trace that comes with the project; None of one that is given itself."""
-    name = config.reference.trace
-    if not name or ROW_END in name:
-        return None
-    if "/" in name:  # of a recording from elsewhere: what it names here is something else
-        raise ConfigError(
-            _KEY, repr(name), "the trace itself, or the name of one beside the scenarios"
-        )
-    return scenario_folder() / name
-
-
 @lru_cache(maxsize=8)
-def _read_trace(path: Path | None, given: str, begin: float) -> Trace:
-    text = given.replace(ROW_END, "\n") if path is None else _read_text(path)
-    values = _parse_values(f"{_KEY} {path}" if path else _KEY, _split_rows(text))
+def _parse_trace(text: str, begin: float) -> Trace:
+    values = _parse_values(_KEY, _split_rows(text.replace(ROW_END, "\n")))
     values.setflags(write=False)
     return Trace(values[:, 0], values[:, 1:], begin)
-
-
-def _read_text(path: Path) -> str:
-    with name_file_errors(ConfigError, f"{_KEY} {path}", _READABLE):
-        return path.read_text(encoding="utf-8-sig")  # as spreadsheets write it
 
 
 def _split_rows(text: str) -> list[list[str]]:

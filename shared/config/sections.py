@@ -21,21 +21,11 @@ Numbers = tuple[float, ...]
 
 
 def number(default: Any, unit: str, low: float, high: float, doc: str) -> Any:
-    """A key that is a number, or as many of them as its default has.
+    """A key that is a number within limits, or as many of them as its default has.
 
-    Args:
-        default: its value where nothing else is said; the type of all others.
-        unit: of the value; "-" or "1" without one.
-        low: least value.
-        high: greatest value.
-        doc: what it means.
+    The default also says the type of all values; the unit is "-" or "1" of what has none.
     """
     return _key(default, doc, unit=unit, low=low, high=high)
-
-
-def text(default: str, doc: str) -> Any:
-    """A key that is any text of one line."""
-    return _key(default, doc)
 
 
 def choice(choices: tuple[str, ...], doc: str, more: str = "") -> Any:
@@ -46,22 +36,19 @@ def choice(choices: tuple[str, ...], doc: str, more: str = "") -> Any:
     return _key(choices[0], doc, choices=choices, more=more)
 
 
+def text(default: str, doc: str) -> Any:
+    """A key that is any text of one line."""
+    return _key(default, doc)
+
+
 def flag(default: bool, doc: str) -> Any:
     """A key that is true or false."""
     return _key(default, doc)
 
 
-def _key(
-    default: Any,
-    doc: str,
-    unit: str = "-",
-    low: float = -inf,
-    high: float = inf,
-    choices: tuple[str, ...] = (),
-    more: str = "",
-) -> Any:
-    meta = {"doc": doc, "unit": unit, "low": low, "high": high, "choices": choices, "more": more}
-    return field(default=default, metadata=meta)
+def _key(default: Any, doc: str, **meta: Any) -> Any:
+    usual = {"unit": "-", "low": -inf, "high": inf, "choices": (), "more": ""}
+    return field(default=default, metadata={"doc": doc, **usual, **meta})
 
 
 @dataclass(frozen=True, slots=True)
@@ -386,7 +373,6 @@ class PlannerConfig:
     )
     max_peer_age: int = number(3, "planning steps", 1, 25, "an older plan of a peer is not shifted")
     hold_steps: int = number(5, "planning steps", 0, 250, "how long a lost peer's terms are held")
-    peer_timeout: float = number(5.0, "s wall", 0.01, 10.0, "lockstep: wait for a peer's plan")
 
     @property
     def option_values(self) -> Mapping[str, float]:
@@ -412,7 +398,6 @@ class IdentificationConfig:
         "force noise of a robot's feet together, of either sign, at each stance foot: along x, y, "
         "z, vertical couple, horizontal couple",
     )
-    noise_hold_ms: int = number(20, "ms", 10, 500, "how long one draw of noise is held")
     vx: Numbers = number((-0.2, 0.7), "m/s", -2.0, inf, "range of random forward speeds")
     vy: Numbers = number((-0.2, 0.2), "m/s", -2.0, inf, "range of random sideways speeds")
     wz: Numbers = number((-0.3, 0.3), "rad/s", -2.0, inf, "range of random yaw rates")
@@ -456,7 +441,7 @@ class ReferenceConfig:
     trace: str = text(
         "",
         "CSV with columns t [s], vx, vy, wz that replaces these three, over and over: a path with "
-        "a '/', whose lines are stored here, separated by ';'; or a file beside the scenarios",
+        "a '/', or a file beside the scenarios; its lines are stored here, separated by ';'",
     )
     driver: str = choice(
         (CONFIGURED, BY_HAND),
@@ -472,7 +457,6 @@ class RecorderConfig:
     """The recording of all traffic."""
 
     enabled: bool = flag(True, "the team waits for the recorder before it walks")
-    chunk_kib: int = number(256, "KiB", 16, 65536, "largest MCAP chunk; closed after 50 ms anyway")
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 from quadriga.shared.config.sections import BRIDGED, Config
 from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.topics import COMMAND, PLAN, SAMPLE_MS, STATE, STATUS, STATUS_MS, TABLE, TRUTH
+
+PEER_TIMEOUT: Final = 5.0  # s wall: so long an agent in lock-step waits for a peer's message
 
 
 def periods(config: Config) -> dict[str, int]:

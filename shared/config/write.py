@@ -17,8 +17,10 @@ _OWN_SECTIONS: Final = ("bus", "runtime", "recorder")
 _AGREED: Final = ("bus.clock_timeout", "recorder.enabled")
 # Single keys that are a computer's own: a label, names of files (what is in these is part of the
 # predictor), where a robot hangs.
-_OWN: Final = ("world.scenario", "identification.response")
-_OWN_OF_BRIDGES: Final = tuple(f"bridge.{k}" for k in ("endpoint", "listen", "interface", "domain"))
+_OWN: Final = (
+    *("world.scenario", "identification.response"),
+    *("bridge.endpoint", "bridge.listen", "bridge.interface", "bridge.domain"),
+)
 _LONGEST: Final = 80  # characters of a value that is told in full
 
 
@@ -28,15 +30,14 @@ def to_toml(config: Config, without: Container[str] = ()) -> str:
     The keys `without`, as `section.key`, are left to their defaults.
     """
     lines = ["# Configuration of quadriga. Every key may be left out: its default then holds."]
-    for section in fields(config):
-        values = getattr(config, section.name)
-        lines += ["", f"# {_summary(values)}", f"[{section.name}]"]
+    for section, values in _sections(config):
+        lines += ["", f"# {_summary(values)}", f"[{section}]"]
         for item in fields(values):
-            if f"{section.name}.{item.name}" in without:
-                continue
-            doc, unit, limits = item.metadata["doc"], _unit(item.metadata), _limits(item.metadata)
-            lines.append(f"# {doc}{f' [{unit}]' if unit else ''}{f'; {limits}' if limits else ''}")
-            lines.append(f"{item.name} = {_toml(getattr(values, item.name))}")
+            if f"{section}.{item.name}" not in without:
+                unit, limits = _unit(item.metadata), _limits(item.metadata)
+                about = item.metadata["doc"] + (f" [{unit}]" if unit else "")
+                lines.append(f"# {about}; {limits}" if limits else f"# {about}")
+                lines.append(f"{item.name} = {_toml(getattr(values, item.name))}")
     return "\n".join(lines) + "\n"
 
 
@@ -49,15 +50,18 @@ def to_markdown(config: Config) -> str:
         "prints the configuration in force as such a file. This page is generated:",
         "`quadriga config --markdown > docs/configuration.md`.",
     ]
-    for section in fields(config):
-        values = getattr(config, section.name)
-        lines += ["", f"## `[{section.name}]`", "", _summary(values), ""]
+    for section, values in _sections(config):
+        lines += ["", f"## `[{section}]`", "", _summary(values), ""]
         lines += ["| key | default | unit | permitted | meaning |", "|---|---|---|---|---|"]
         for item in fields(values):
             meta, default = item.metadata, f"`{_toml(getattr(values, item.name))}`"
             cells = (f"`{item.name}`", default, _unit(meta), _limits(meta), meta["doc"])
             lines.append(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |")
     return "\n".join(lines) + "\n"
+
+
+def _sections(config: Config) -> Iterator[tuple[str, Any]]:
+    return ((section.name, getattr(config, section.name)) for section in fields(config))
 
 
 def config_sha256(config: Config) -> str:
@@ -79,25 +83,21 @@ def agreed_keys(config: Config) -> tuple[str, ...]:
     found = list[str]()
     for section, keys in asdict(config).items():
         for key, value in keys.items():
-            name = f"{section}.{key}"
-            own = section in _OWN_SECTIONS or name in (*_OWN, *_OWN_OF_BRIDGES)
-            if own and name not in _AGREED:
-                continue
-            text = json.dumps(value)
+            name, text = f"{section}.{key}", json.dumps(value)
             if len(text) > _LONGEST:
                 text = f"sha256:{hashlib.sha256(text.encode()).hexdigest()[:16]}"
-            found.append(f"{name}={text}")
+            if name in _AGREED or not (section in _OWN_SECTIONS or name in _OWN):
+                found.append(f"{name}={text}")
     return tuple(sorted(found))
 
 
 def departures(config: Config, usual: Config) -> Iterator[tuple[str, Any, Any, Mapping[str, Any]]]:
     """Keys whose values differ, but for `bus`: `section.key`, value, usual one, key's metadata."""
-    for section in fields(config):
-        mine, theirs = getattr(config, section.name), getattr(usual, section.name)
-        for item in fields(mine):
-            value, other = getattr(mine, item.name), getattr(theirs, item.name)
-            if value != other and section.name != "bus":
-                yield f"{section.name}.{item.name}", value, other, item.metadata
+    for section, mine in _sections(config):
+        for item in fields(mine) if section != "bus" else ():
+            value, other = (getattr(of, item.name) for of in (mine, getattr(usual, section)))
+            if value != other:
+                yield f"{section}.{item.name}", value, other, item.metadata
 
 
 def _summary(section: Any) -> str:

@@ -12,7 +12,6 @@ from quadriga.shared.topics import find_topic
 LARGEST: Final = MAX_BYTES  # bytes of a payload: a larger one is no message to anybody
 MAX_KEYS: Final = 32_768  # of a file: its format counts them with 16 bits
 MAX_FOREIGN_KEYS: Final = 4096
-MAX_FOREIGN_BYTES: Final = 1 << 28
 LONGEST_KEY: Final = 1024  # characters; those of this project have 100 at most
 
 # Reasons for which a message is not stored, as they are noted in a recording, and in words.
@@ -25,7 +24,7 @@ _REASONS: Final[Mapping[str, str]] = {
 
 
 class Quota:
-    """Decides of each message whether it is stored, and counts those that are not.
+    """Decides of each key whether it is stored, and counts messages that are not.
 
     Args:
         is_own: whether a key is the team's: such are always stored; by default all of the table of
@@ -33,8 +32,9 @@ class Quota:
         largest: payload that is stored, bytes.
 
     Attributes:
+        largest: as given.
         refused: messages that were not stored, by reason: `OVERSIZED`, or `REFUSED` of what others
-            send beyond `MAX_FOREIGN_KEYS` and `MAX_FOREIGN_BYTES`, in all files together.
+            send beyond `MAX_FOREIGN_KEYS`, in all files together.
     """
 
     def __init__(
@@ -42,32 +42,20 @@ class Quota:
         is_own: Callable[[str], bool] = lambda key: find_topic(key)[0] is not None,
         largest: int = LARGEST,
     ) -> None:
-        self.is_own, self._largest = is_own, largest
+        self.largest, self._is_own = largest, is_own
         self._foreign: set[str] = set()
-        self._bytes = 0  # of what others sent
         self.refused: Counter[str] = Counter(dict.fromkeys(_REASONS, 0))
 
-    def admits_key(self, key: str, known: int) -> bool:
-        """Whether there is room for a key in a file that has `known` of them; counts if not."""
-        room = len(self._foreign) < MAX_FOREIGN_KEYS and len(key) <= LONGEST_KEY
-        own = self.is_own(key)
-        if known >= MAX_KEYS or not (own or room or key in self._foreign):
-            self.refused[REFUSED] += 1
+    def admits(self, key: str, known: int) -> bool:
+        """Whether there is room for a key in a file that has `known` of them."""
+        if known >= MAX_KEYS:
             return False
-        if not own:
+        if self._is_own(key) or key in self._foreign:
+            return True
+        room = len(self._foreign) < MAX_FOREIGN_KEYS and len(key) <= LONGEST_KEY
+        if room:
             self._foreign.add(key)
-        return True
-
-    def admits_payload(self, size: int, *, own: bool) -> bool:
-        """Whether a payload of so many bytes of an admitted key is stored; counts if not."""
-        reason = OVERSIZED if size > self._largest else ""
-        if not own and self._bytes + size > MAX_FOREIGN_BYTES:
-            reason = reason or REFUSED
-        if reason:
-            self.refused[reason] += 1
-        elif not own:
-            self._bytes += size
-        return not reason
+        return room
 
 
 def describe_refused(refused: Mapping[str, int]) -> list[str]:

@@ -12,9 +12,10 @@ from collections.abc import Container, Iterator
 from contextlib import suppress
 from io import SEEK_CUR, SEEK_END, BytesIO
 from pathlib import Path
-from typing import BinaryIO, Final, NamedTuple, TypeVar
+from typing import Final, NamedTuple, TypeVar
 
 import lz4.frame
+import numpy as np
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
@@ -31,7 +32,7 @@ from quadriga.shared.topics import TABLE, find_topic, topic_of
 M = TypeVar("M", bound=Message)
 
 RECORD: Final = struct.Struct("<BQ")  # opcode, length
-LARGEST_CHUNK: Final = 1 << 27  # bytes unpacked; `recorder.chunk_kib` is half of that at most
+LARGEST_CHUNK: Final = 1 << 27  # bytes unpacked
 # What the MCAP library, LZ4 and Zstandard raise on bytes that are no record.
 CORRUPT: Final = (
     *(McapError, struct.error, ValueError, RuntimeError, IndexError, EOFError, MemoryError),
@@ -43,7 +44,6 @@ _LATEST: Final = (1 << 63) - 1  # ns: what MCAP has 64 bits for, tables have 63 
 BARE: Final = (Opcode.CHANNEL, Opcode.MESSAGE)  # in chunks, and outside of any
 _RECOVER: Final = "`quadriga recover` writes what is readable"
 _MEND: Final = f"one cut or damaged in its first bytes: {_RECOVER}"
-_PART: Final = 1 << 20  # bytes that are read at once
 _DATA_END: Final = RECORD.size + 4  # bytes
 _FOOTER: Final = RECORD.size + 20  # bytes
 
@@ -87,7 +87,12 @@ class Recording:
                 raise RecordingError(str(path), "an empty file", "a recording")
             got = f"{self._size:,} bytes that do not start as MCAP"
             raise RecordingError(str(path), got, "an MCAP file", f"a foreign file, or {_MEND}")
-        self.metadata = self._metadata()
+        for record in self._metadata():
+            if record.name == PROFILE:
+                self.metadata = unseal(record.metadata, str(path))
+                return
+        got, expected = "no metadata of this project", "a recording made by `quadriga`"
+        raise RecordingError(str(path), got, expected, f"a foreign MCAP file, or {_MEND}")
 
     def entries(
         self, names: Container[str] | None = None, keys: Container[str] | None = None
@@ -130,21 +135,22 @@ class Recording:
         """
         if not self.complete:
             raise self._damage_error(f"a file that is cut after {self._size:,} bytes")
-        footer_at = self._size - len(MCAP0_MAGIC) - _FOOTER
-        with self.path.open("rb") as file:
-            file.seek(footer_at)
-            end = file.read(_FOOTER)
-            footer = Footer.read(stream(end[RECORD.size :]))
-            start = footer.summary_start or footer_at  # 0: no summary
-            file.seek(max(min(start, self._size) - _DATA_END, 0))
-            data_end = file.read(_DATA_END)
-            summary = file.read(max(self._size - len(MCAP0_MAGIC) - 4 - start, 0))
-            there = end[0] == Opcode.FOOTER and data_end.startswith(RECORD.pack(Opcode.DATA_END, 4))
-            if not there or footer.summary_crc not in (0, zlib.crc32(summary)):
-                raise self._damage_error("an index that fails its checksum")
-            crc = int.from_bytes(data_end[RECORD.size :], "little")
-            if crc and _crc(file, start - _DATA_END) != crc:
-                raise self._damage_error("content that fails its checksum")
+        content = np.memmap(self.path, np.uint8, "r").data
+        footer_at = max(self._size - len(MCAP0_MAGIC) - _FOOTER, 0)
+        footer = Footer.read(stream(content[footer_at + RECORD.size :].tobytes()))
+        start = footer.summary_start or footer_at  # 0: no summary
+        data_at = max(start - _DATA_END, 0)
+        data_end = content[data_at:start].tobytes()
+        there = data_end.startswith(RECORD.pack(Opcode.DATA_END, 4))
+        summary_crc = zlib.crc32(content[start : self._size - len(MCAP0_MAGIC) - 4])
+        if not (there and content[footer_at] == Opcode.FOOTER) or footer.summary_crc not in (
+            0,
+            summary_crc,
+        ):
+            raise self._damage_error("an index that fails its checksum")
+        crc = int.from_bytes(data_end[RECORD.size :], "little")
+        if crc and zlib.crc32(content[:data_at]) != crc:
+            raise self._damage_error("content that fails its checksum")
         if not crc:  # then those of the chunks must do
             for _ in self.entries():
                 pass
@@ -154,13 +160,8 @@ class Recording:
     @property
     def notes(self) -> dict[str, dict[str, str]]:
         """What the writer noted at the end, by name: `COUNTS`, `LOST` …; {} after a kill."""
-        notes: dict[str, dict[str, str]] = {}
         cut = self.cut  # of the chunks, which are not read here
-        for opcode, content in self._records(skip=Opcode.CHUNK):
-            with suppress(*CORRUPT):
-                if opcode == Opcode.METADATA:
-                    record = Metadata.read(stream(content))
-                    notes[record.name] = dict(record.metadata)
+        notes = {record.name: dict(record.metadata) for record in self._metadata()}
         self.cut = cut
         notes.pop(PROFILE, None)
         return notes
@@ -186,17 +187,11 @@ class Recording:
                     yield opcode, file.read(length)
         self.cut = f"the file ends at byte {self._size} in the middle of a record"
 
-    def _metadata(self) -> dict[str, str]:
-        for opcode, content in self._records(skip=Opcode.MESSAGE_INDEX):
+    def _metadata(self) -> Iterator[Metadata]:
+        for opcode, content in self._records(skip=Opcode.CHUNK):
             if opcode == Opcode.METADATA:
                 with suppress(*CORRUPT):
-                    record = Metadata.read(stream(content))
-                    if record.name == PROFILE:
-                        return unseal(record.metadata, str(self.path))
-            if opcode == Opcode.CHUNK:
-                break
-        got, expected = "no metadata of this project", "a recording made by `quadriga`"
-        raise RecordingError(str(self.path), got, expected, f"a foreign MCAP file, or {_MEND}")
+                    yield Metadata.read(stream(content))
 
 
 def messages_of(
@@ -273,13 +268,3 @@ def name_of(key: str) -> str:
     """Name of a key's topic, "" if the table has none."""
     topic, _ = find_topic(key)
     return "" if topic is None else topic.name
-
-
-def _crc(file: BinaryIO, length: int) -> int:
-    """Checksum of the first `length` bytes of a file."""
-    file.seek(0)
-    crc = 0
-    while length > 0 and (part := file.read(min(length, _PART))):
-        crc = zlib.crc32(part, crc)
-        length -= len(part)
-    return crc

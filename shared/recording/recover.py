@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import mmap
 import re
-import struct
 import zlib
 from collections.abc import Iterator
 from contextlib import suppress
@@ -17,7 +16,7 @@ from mcap.opcode import Opcode
 from mcap.writer import MCAP0_MAGIC
 
 from quadriga.shared.errors import RecordingError, name_file_errors
-from quadriga.shared.recording.metadata import PROFILE, unseal
+from quadriga.shared.recording.metadata import CHANNELS, PROFILE, unseal
 from quadriga.shared.recording.reader import (
     BARE,
     CORRUPT,
@@ -30,8 +29,6 @@ from quadriga.shared.recording.reader import (
 )
 
 _HEAD: Final = re.compile(rb"(?s)[\x01-\x0f\x80-\xff].{4}\0{4}")  # of a record below 4 GiB
-# A chunk's record: opcode, length, first and last log time, size, checksum, packing, packed size.
-_CHUNK: Final = struct.Struct("<BQQQQI")
 _ANY_CHUNK: Final = (  # what one begins with; not packed, both sizes in it are the same
     rb"(?s)\x06.{4}\0{4}.{16}(?!\0{8})(.{8}).{4}(?:\0{4}\1|\x03\0{3}lz4|\x04\0{3}zstd)"
 )
@@ -49,13 +46,11 @@ class Damage:
         at: its first byte.
         size: bytes.
         what: what is wrong with it.
-        log_times: of a chunk, first and last log time of its messages as it says, ns.
     """
 
     at: int
     size: int
     what: str
-    log_times: tuple[int, int] | None = None
 
     def __str__(self) -> str:
         where = f"byte {self.at:,}"
@@ -87,6 +82,7 @@ class DamagedRecording:
         self.damages: list[Damage] = []
         self.metadata: dict[str, str] = {}
         self.notes: dict[str, dict[str, str]] = {}
+        self._noted: dict[int, str | None] = {}  # keys by channel
         with name_file_errors(RecordingError, path, "a recording"), path.open("rb") as file:
             try:
                 self._file = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
@@ -109,7 +105,7 @@ class DamagedRecording:
     def entries(self) -> Iterator[ChunkEntry]:
         """Every message that can be read, in the order of the file."""
         self.damages = list(self._scanned)
-        keys = self._indexed_keys()
+        keys = self._noted | self._indexed_keys()
         for at, end in self._pieces:
             try:
                 bare = self._file[at] in BARE
@@ -153,18 +149,16 @@ class DamagedRecording:
         return 0
 
     def _pass_damage(self, at: int, done: int) -> int:
-        """Where the next record may begin after a byte at which none that is intact does."""
-        file, what, times = self._file, "no record begins here", None
-        end = at + RECORD.size + int.from_bytes(file[at + 1 : at + RECORD.size], "little")
-        if file[at] == Opcode.CHUNK and end < done and self._is_head(end):
-            what, times = "a chunk that fails its checksum", _CHUNK.unpack_from(file, at)[2:4]
-        else:
-            kept = _KEPT if self._chunked else _BARE_KEPT
-            starts = (found.start() for found in kept.finditer(file, at + 1))
-            end = next((start for start in starts if self._end_of(start)), done)
-            if end == done == len(file):
-                what = _CUT
-        self.damages.append(Damage(at, end - at, what, times))
+        """Where the next record begins after a byte at which none that is intact does."""
+        kept = _KEPT if self._chunked else _BARE_KEPT
+        starts = (found.start() for found in kept.finditer(self._file, at + 1))
+        end = next((start for start in starts if self._end_of(start)), done)
+        what = "no record begins here"
+        if end == done == len(self._file):
+            what = _CUT
+        elif self._file[at] == Opcode.CHUNK:
+            what = "a chunk that fails its checksum"
+        self.damages.append(Damage(at, end - at, what))
         return end
 
     def _is_head(self, at: int) -> bool:
@@ -174,12 +168,15 @@ class DamagedRecording:
 
     def _keep(self, record: records.Metadata) -> bool:
         """Keep metadata; False if they are damaged."""
-        if record.name != PROFILE:
+        if record.name not in (PROFILE, CHANNELS):
             self.notes.setdefault(record.name, dict(record.metadata))
             return True
-        with suppress(RecordingError):
+        with suppress(RecordingError, ValueError):
             values = unseal(record.metadata, str(self.path))
-            self.metadata = self.metadata or values
+            if record.name == PROFILE:
+                self.metadata = self.metadata or values
+            else:
+                self._noted |= {int(channel): key for channel, key in values.items()}
             return True
         return False
 

@@ -39,9 +39,6 @@ class Geometry(NamedTuple):
     mass: float
 
 
-N_GEOMETRY: Final = len(Geometry._fields)
-
-
 @dataclass(frozen=True)
 class RobotSpec:
     """A kind of robot: four legs with a hip that turns about x, a thigh and a calf about y.

@@ -34,8 +34,7 @@ from quadriga.shared.members import (
 )
 from quadriga.shared.messages import Message
 from quadriga.shared.robots.conventions import robot_names
-from quadriga.shared.topic import Topic
-from quadriga.shared.topics import CLOCK, ESTOP, RECEIVED, STATE, STATUS, TABLE, TRUTH
+from quadriga.shared.topics import CLOCK, ESTOP, RECEIVED, STATE, STATUS, TABLE, TRUTH, Topic
 
 _SPEAKERS: Final = (members.ESTOP, members.STOP, members.RESET, members.RESUME)
 _OTHERS: Final = (members.LAUNCHER, *_SPEAKERS, DOCTOR, OBSERVER, ROUTER)

@@ -23,7 +23,9 @@ _ADDRESS: Final = 1 << 24
 _STRING, _SEQUENCE, _ARRAY = 5 << 16, 7 << 16, 8 << 16
 _SIZES: Final = {1: 1, 2: 2, 4: 3, 8: 4}  # code of a number by its bytes
 _KINDS: Final = {"u": 0, "i": 4, "f": 2}  # flag of a number by numpy's kind
-_SEQUENCE_OF_BYTES: Final = _ADDRESS | _SEQUENCE | _SIZES[1] << 8
+STRING: Final = _ADDRESS | _STRING  # a `char *`; its offset follows
+# Maximum, length, buffer, whether it is ours to free; the offset of these follows.
+SEQUENCE_OF_BYTES: Final = _ADDRESS | _SEQUENCE | _SIZES[1] << 8
 _THERE_ALREADY: Final = -4  # DDS_RETCODE_PRECONDITION_NOT_MET, of a domain
 _CONFIG: Final = (
     '<CycloneDDS><Domain Id="any"><General><Interfaces>'
@@ -41,47 +43,28 @@ _KEEP_LAST, _NOT_MINE = 0, 1  # DDS_HISTORY_KEEP_LAST, DDS_IGNORELOCAL_PARTICIPA
 _KEPT: Final = 128  # samples of a reader: a quarter of a second of a robot's reports
 
 
-class _Serialised(c.Structure):
-    _fields_ = (("data", c.c_void_p), ("size", c.c_uint32))
+def c_struct(**fields: Any) -> Any:
+    """A struct in C with these fields."""
+    return type("CStruct", (c.Structure,), {"_fields_": list(fields.items())})
 
 
-class _Descriptor(c.Structure):
-    """`dds_topic_descriptor_t`; what is left zero is the type information."""
-
-    _fields_ = (
-        ("size", c.c_uint32),
-        ("alignment", c.c_uint32),
-        ("flags", c.c_uint32),
-        ("keys_count", c.c_uint32),
-        ("typename", c.c_char_p),
-        ("keys", c.c_void_p),
-        ("ops_count", c.c_uint32),
-        ("ops", c.c_void_p),
-        ("meta", c.c_char_p),
-        ("type_information", _Serialised),
-        ("type_mapping", _Serialised),
-        ("data_representation", c.c_uint32),
-    )
-
-
-class _SampleInfo(c.Structure):
-    """`dds_sample_info_t`."""
-
-    _fields_ = (
-        ("sample_state", c.c_int),
-        ("view_state", c.c_int),
-        ("instance_state", c.c_int),
-        ("valid_data", c.c_bool),
-        ("source_timestamp", c.c_int64),
-        ("instance", c.c_uint64),
-        ("publication", c.c_uint64),
-        ("disposed", c.c_uint32),
-        ("no_writers", c.c_uint32),
-        ("sample_rank", c.c_uint32),
-        ("generation_rank", c.c_uint32),
-        ("absolute_generation_rank", c.c_uint32),
-    )
-
+_NUMBER, _POINTER = c.c_uint32, c.c_void_p
+_Serialised: Final = c_struct(data=_POINTER, size=_NUMBER)
+# `dds_topic_descriptor_t`; what is left zero is the type information.
+_Descriptor: Final = c_struct(
+    **dict.fromkeys(("size", "alignment", "flags", "keys_count"), _NUMBER),
+    **{"typename": c.c_char_p, "keys": _POINTER, "ops_count": _NUMBER, "ops": _POINTER},
+    **{"meta": c.c_char_p, "type_information": _Serialised, "type_mapping": _Serialised},
+    data_representation=_NUMBER,
+)
+# `dds_sample_info_t`.
+_SampleInfo: Final = c_struct(
+    **dict.fromkeys(("sample_state", "view_state", "instance_state"), c.c_int),
+    **{"valid_data": c.c_bool, "source_timestamp": c.c_int64},
+    **dict.fromkeys(("instance", "publication"), c.c_uint64),
+    **dict.fromkeys(("disposed", "no_writers", "sample_rank", "generation_rank"), _NUMBER),
+    absolute_generation_rank=_NUMBER,
+)
 
 _ARGUMENTS: Final = {
     "dds_create_domain": (c.c_uint32, c.c_char_p),
@@ -146,20 +129,10 @@ def number_at(offset: int, kind: str, size: int) -> list[int]:
     return [_ADDRESS | _SIZES[size] << 16 | _KINDS[kind], offset]
 
 
-def string_at(offset: int) -> list[int]:
-    """How to find a string, a `char *` at this offset."""
-    return [_ADDRESS | _STRING, offset]
-
-
-def bytes_at(offset: int) -> list[int]:
-    """How to find a sequence of bytes: maximum, length, buffer, whether it is ours to free."""
-    return [_SEQUENCE_OF_BYTES, offset]
-
-
 class StructTopic(NamedTuple):
     """A topic whose samples are structs in C: its name, its type, how the library finds the fields.
 
-    `ops` is made of `operations`, or of `number_at` and its like.
+    `ops` is made of `operations`, or of `number_at`, `STRING` and `SEQUENCE_OF_BYTES`.
     """
 
     name: str
@@ -207,14 +180,14 @@ class DdsParticipant:
         inner = zlib.crc32(f"{domain} {interface}".encode()) & _NUMBERS
         self._domain = self.library.dds_create_domain(inner, text)
         if self._domain != _THERE_ALREADY:  # made by another participant of this process
-            self._check(self._domain, where)
+            _check(self._domain, where)
         created = self.library.dds_create_participant(inner, None, None)
         if created < 0:
             self.library.dds_delete(self._domain)
-        self.handle = self._check(created, where)
+        self.handle = _check(created, where)
         self._kept: list[Any] = []
 
-    def topic(self, topic: StructTopic) -> int:
+    def declare(self, topic: StructTopic) -> int:
         """Declare a topic.
 
         Raises:
@@ -224,29 +197,7 @@ class DdsParticipant:
         self._kept += [descriptor, program]
         where, name = c.addressof(descriptor), topic.name.encode()
         made = self.library.dds_create_topic(self.handle, where, name, None, None)
-        return self._check(made, f"DDS topic {topic.name}")
-
-    def reader(self, topic: int, *, of_others: bool = False) -> int:
-        """A reader: best effort, keeps the last samples, perhaps only `of_others`."""
-        qos = self.library.dds_create_qos()
-        self.library.dds_qset_history(qos, _KEEP_LAST, _KEPT)
-        self.library.dds_qset_ignorelocal(qos, _NOT_MINE if of_others else 0)
-        made = self.library.dds_create_reader(self.handle, topic, qos, None)
-        self.library.dds_delete_qos(qos)
-        return self._check(made, "DDS reader")
-
-    def writer(self, topic: int) -> int:
-        """A writer: reliable, keeps the last sample."""
-        made = self.library.dds_create_writer(self.handle, topic, None, None)
-        return self._check(made, "DDS writer")
-
-    def writers_seen_by(self, reader: int) -> int:
-        """How many writers a reader is matched with, this participant's own included."""
-        return max(0, int(self.library.dds_get_matched_publications(reader, None, 0)))
-
-    def readers_seen_by(self, writer: int) -> int:
-        """How many readers a writer is matched with."""
-        return max(0, int(self.library.dds_get_matched_subscriptions(writer, None, 0)))
+        return _check(made, f"DDS topic {topic.name}")
 
     def close(self) -> None:
         """Leave the domain, and have the others know it."""
@@ -262,16 +213,16 @@ class DdsParticipant:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    @staticmethod
-    def _check(handle: int, what: str) -> int:
-        if handle < 0:
-            cause = "is there such an interface? does another process use it with other settings?"
-            raise BridgeError(what, f"error {handle} of CycloneDDS", "to be open", cause)
-        return handle
+
+def _check(handle: int, what: str) -> int:
+    if handle < 0:
+        cause = "is there such an interface? does another process use it with other settings?"
+        raise BridgeError(what, f"error {handle} of CycloneDDS", "to be open", cause)
+    return handle
 
 
 class StructReader:
-    """Takes samples of a topic.
+    """Takes samples of a topic: best effort, of the last ones.
 
     Args:
         participant: of the domain.
@@ -286,7 +237,13 @@ class StructReader:
         self, participant: DdsParticipant, topic: StructTopic, *, of_others: bool = False
     ) -> None:
         self._library = participant.library
-        self.handle = participant.reader(participant.topic(topic), of_others=of_others)
+        qos = self._library.dds_create_qos()
+        self._library.dds_qset_history(qos, _KEEP_LAST, _KEPT)
+        self._library.dds_qset_ignorelocal(qos, _NOT_MINE if of_others else 0)
+        declared = participant.declare(topic)
+        made = self._library.dds_create_reader(participant.handle, declared, qos, None)
+        self._library.dds_delete_qos(qos)
+        self._handle = _check(made, "DDS reader")
         self._sample = c.create_string_buffer(topic.size)
         self._samples = (c.c_void_p * 1)(c.addressof(self._sample))
         self._info = _SampleInfo()
@@ -294,7 +251,7 @@ class StructReader:
     def take(self) -> bytes | None:
         """The oldest sample that has not been taken; None if there is none."""
         where = c.addressof(self._samples), c.addressof(self._info)
-        while self._library.dds_take(self.handle, *where, 1, 1) > 0:
+        while self._library.dds_take(self._handle, *where, 1, 1) > 0:
             if self._info.valid_data:  # else a writer has left
                 return self._sample.raw
         return None
@@ -304,20 +261,32 @@ class StructReader:
         """Who wrote the sample that was taken last, a number of this participant's."""
         return int(self._info.publication)
 
+    @property
+    def writers(self) -> int:
+        """How many writers there are, this participant's own included."""
+        return max(0, int(self._library.dds_get_matched_publications(self._handle, None, 0)))
+
 
 class StructWriter:
-    """Writes samples of a topic; its arguments as those of `StructReader`."""
+    """Writes samples of a topic, reliably; its arguments as those of `StructReader`."""
 
     def __init__(self, participant: DdsParticipant, topic: StructTopic) -> None:
         self._library = participant.library
-        self.handle = participant.writer(participant.topic(topic))
+        declared = participant.declare(topic)
+        made = self._library.dds_create_writer(participant.handle, declared, None, None)
+        self._handle = _check(made, "DDS writer")
         self._sample = c.create_string_buffer(topic.size)
 
     def send(self, sample: bytes) -> bool:
         """Write; whether the library took it."""
         self._sample.raw = sample
-        return bool(self._library.dds_write(self.handle, c.addressof(self._sample)) >= 0)
+        return bool(self._library.dds_write(self._handle, c.addressof(self._sample)) >= 0)
+
+    @property
+    def readers(self) -> int:
+        """How many readers there are."""
+        return max(0, int(self._library.dds_get_matched_subscriptions(self._handle, None, 0)))
 
     def close(self) -> None:
         """Write no more, and have the readers know it; the participant stays."""
-        self._library.dds_delete(self.handle)
+        self._library.dds_delete(self._handle)

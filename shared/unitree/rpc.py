@@ -10,13 +10,14 @@ from collections.abc import Iterator
 from typing import Any, Final, NamedTuple
 
 from quadriga.shared.unitree.dds import (
+    SEQUENCE_OF_BYTES,
+    STRING,
     DdsParticipant,
     StructReader,
     StructTopic,
     StructWriter,
-    bytes_at,
+    c_struct,
     number_at,
-    string_at,
 )
 
 MOTION_SWITCHER: Final = "motion_switcher"
@@ -28,49 +29,29 @@ OK: Final = 0
 UNKNOWN: Final = 3203  # there is no such call
 
 
-class _RpcBytes(c.Structure):
-    _fields_ = (
-        ("maximum", c.c_uint32),
-        ("length", c.c_uint32),
-        ("buffer", c.c_void_p),
-        ("release", c.c_bool),
-    )
+_LONG, _INT, _TEXT = c.c_int64, c.c_int32, c.c_char_p
+_RpcBytes: Final = c_struct(
+    maximum=c.c_uint32, length=c.c_uint32, buffer=c.c_void_p, release=c.c_bool
+)
+_RpcRequest: Final = c_struct(
+    id=_LONG, api=_LONG, lease=_LONG, priority=_INT, no_reply=c.c_bool, text=_TEXT, binary=_RpcBytes
+)
+_RpcResponse: Final = c_struct(id=_LONG, api=_LONG, code=_INT, text=_TEXT, binary=_RpcBytes)
 
 
-class _RpcRequest(c.Structure):
-    _fields_ = (
-        ("id", c.c_int64),
-        ("api", c.c_int64),
-        ("lease", c.c_int64),
-        ("priority", c.c_int32),
-        ("no_reply", c.c_bool),
-        ("text", c.c_char_p),
-        ("binary", _RpcBytes),
-    )
-
-
-class _RpcResponse(c.Structure):
-    _fields_ = (
-        ("id", c.c_int64),
-        ("api", c.c_int64),
-        ("code", c.c_int32),
-        ("text", c.c_char_p),
-        ("binary", _RpcBytes),
-    )
-
-
-def _operations(layout: type[c.Structure]) -> list[int]:
-    """How the library finds the fields of one of these structs."""
+def _topic(service: str, kind: str, layout: Any) -> StructTopic:
     ops = list[int]()
-    for name, kind, *_ in layout._fields_:
+    for name, of in layout._fields_:
         at = getattr(layout, name).offset
-        if kind is c.c_char_p:
-            ops += string_at(at)
-        elif kind is _RpcBytes:
-            ops += bytes_at(at)
+        if of is _TEXT:
+            ops += [STRING, at]
+        elif of is _RpcBytes:
+            ops += [SEQUENCE_OF_BYTES, at]
         else:
-            ops += number_at(at, "u" if kind is c.c_bool else "i", c.sizeof(kind))
-    return ops
+            ops += number_at(at, "u" if of is c.c_bool else "i", c.sizeof(of))
+    typename = f"unitree_api::msg::dds_::{kind}_"
+    name = f"rt/api/{service}/{kind.lower()}"
+    return StructTopic(name, typename, c.sizeof(layout), c.alignment(layout), ops)
 
 
 class RpcMessage(NamedTuple):
@@ -102,38 +83,29 @@ class RpcEnd:
     """
 
     def __init__(self, participant: DdsParticipant, service: str, *, serves: bool) -> None:
-        self._participant, self._serves, self.service = participant, serves, service
-        layouts = {"request": _RpcRequest, "response": _RpcResponse}
-        topics = [
-            StructTopic(
-                f"rt/api/{service}/{kind}",
-                f"unitree_api::msg::dds_::{kind.capitalize()}_",
-                c.sizeof(layout),
-                c.alignment(layout),
-                _operations(layout),
-            )
-            for kind, layout in layouts.items()
-        ]
-        self._writer = StructWriter(participant, topics[serves])
-        self._reader = StructReader(participant, topics[not serves])
+        self._serves, self.service = serves, service
+        request = _topic(service, "Request", _RpcRequest)
+        response = _topic(service, "Response", _RpcResponse)
+        written, read = (response, request) if serves else (request, response)
+        self._writer = StructWriter(participant, written)
+        self._reader = StructReader(participant, read)
 
     @property
     def is_linked(self) -> bool:
         """Whether somebody is at the other end: what is sent before is lost."""
-        seen, there = self._participant, self._writer.handle
-        return bool(seen.readers_seen_by(there) and seen.writers_seen_by(self._reader.handle))
+        return bool(self._writer.readers and self._reader.writers)
 
     def send(self, message: RpcMessage) -> bool:
         """Send; whether the library took it."""
         number, api, text, code = message
-        sample: Any = _RpcRequest(number, api, text=text.encode())
+        sample = _RpcRequest(number, api, text=text.encode())
         if self._serves:
             sample = _RpcResponse(number, api, code, text.encode())
         return self._writer.send(bytes(sample))
 
     def receive(self) -> Iterator[RpcMessage]:
         """What has come since the last call."""
-        layout: Any = _RpcRequest if self._serves else _RpcResponse
+        layout = _RpcRequest if self._serves else _RpcResponse
         while (raw := self._reader.take()) is not None:
             sample = layout.from_buffer_copy(raw)  # its text is the reader's, until the next
             code = OK if self._serves else int(sample.code)

@@ -75,7 +75,7 @@ def reference_traces(folder: Path) -> Reader:
     short = b"".join(good.splitlines(keepends=True)[:12])
 
     def read(path: Path) -> None:
-        line = inline_trace(path)
+        line = inline_trace(str(path))
         if ROW_END in line and line.isprintable():
             trace = trace_of(load(None, {"reference.trace": line}))
             assert trace is not None

@@ -7,6 +7,7 @@ from io import BytesIO
 from pathlib import Path
 
 import numpy as np
+from mcap.writer import CompressionType, Writer
 
 from quadriga.recordings.check import check, format_findings
 from quadriga.recordings.info import format_survey
@@ -20,11 +21,12 @@ from quadriga.shared.printable import printable_line
 from quadriga.shared.recording.metadata import PROFILE, seal
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.recording.recover import DamagedRecording
-from quadriga.shared.recording.writer import McapFile, RecordingWriter
+from quadriga.shared.recording.writer import RecordingWriter
 from quadriga.shared.topics import TABLE
 from tests.fuzz.arrays import SMALL
 from tests.fuzz.damage import damage
 from tests.fuzz.target import example
+from tests.shared.recording.test_reader import append_to_chunk
 
 
 class Recordings:
@@ -49,17 +51,18 @@ class Recordings:
     def _forge(self, random: np.random.Generator) -> bytes:
         """A file that another program might write, all of whose checksums are right."""
         file, metadata = BytesIO(), dict(self._metadata)
-        out = McapFile(file, 1 << 20, PROFILE, "other")
+        out = Writer(file, compression=CompressionType.LZ4, enable_data_crcs=True)
+        out.start(PROFILE, "other")
         if random.random() < 0.3:
             name = str(random.choice(list(metadata)))
             metadata[name] = damage(metadata[name].encode(), random).decode("utf-8", "replace")
-        out.metadata(PROFILE, seal(metadata))
-        out.metadata(f"{PROFILE}.counts", {"messages": "9" * int(random.integers(1, 5000))})
+        out.add_metadata(PROFILE, seal(metadata))
+        out.add_metadata(f"{PROFILE}.counts", {"messages": "9" * int(random.integers(1, 5000))})
         for key, payload in self._payloads:
             shown = damage(key.encode(), random).decode("utf-8", "replace")
-            channel = out.channel(key if random.random() < 0.7 else shown, "msgpack", 0)
-            out.message(channel, 0, int(random.integers(1 << 62)), 1, damage(payload, random))
-        out._append(damage(b"\x05" + bytes(40), random))
+            channel = out.register_channel(key if random.random() < 0.7 else shown, "msgpack", 0)
+            out.add_message(channel, int(random.integers(1 << 62)), damage(payload, random), 1)
+        append_to_chunk(out, damage(b"\x05" + bytes(40), random))
         out.finish()
         return file.getvalue()
 

@@ -12,6 +12,7 @@ from typing import Any, Final
 from zlib import crc32
 
 import numpy as np
+from mcap.writer import CompressionType, Writer
 
 from quadriga.agents.agent import Agent
 from quadriga.agents.inbox.inbox import Inbox
@@ -42,7 +43,6 @@ from quadriga.shared.messages import Message
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.metadata import PROFILE, seal
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.recording.writer import McapFile
 from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.topics import TABLE
 from quadriga.view.recorded import RecordedRun
@@ -100,8 +100,9 @@ class Walks:
     def make(self, random: np.random.Generator) -> bytes:
         changed = float(random.choice([0.02, 0.1, 0.5]))
         file, channels = BytesIO(), dict[str, int]()
-        out = McapFile(file, 1 << 16, PROFILE, "other")
-        out.metadata(PROFILE, seal(self._metadata))
+        out = Writer(file, 1 << 16, CompressionType.LZ4, enable_data_crcs=True)
+        out.start(PROFILE, "other")
+        out.add_metadata(PROFILE, seal(self._metadata))
         for place, (key, message) in enumerate(self._walk):
             chance, payload, log_ns = random.random(), self._payloads[place], 0
             if chance < 0.02:
@@ -113,8 +114,8 @@ class Walks:
                 payload = damage(payload, random)
             channel = channels.get(key)
             if channel is None:
-                channel = channels[key] = out.channel(key, "msgpack", 0)
-            out.message(channel, 0, log_ns or _LOG_NS + place, 1, payload)
+                channel = channels[key] = out.register_channel(key, "msgpack", 0)
+            out.add_message(channel, log_ns or _LOG_NS + place, payload, 1)
         out.finish()
         content = file.getvalue()
         return content if random.random() < 0.9 else content[: int(random.integers(len(content)))]

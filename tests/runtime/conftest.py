@@ -29,8 +29,7 @@ from quadriga.shared.errors import MessageError
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic
-from quadriga.shared.topic import Topic
-from quadriga.shared.topics import TRUTH
+from quadriga.shared.topics import TRUTH, Topic
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import QUADRIGA, Launch, ProcessSpec, process_table
 from quadriga.warm_up import warm_up

@@ -12,7 +12,6 @@ from quadriga.experiments.trial.figures_of_merit import Figures
 from quadriga.experiments.trial.origin import code_and_libraries, foreign_origin, is_same_code
 from quadriga.experiments.trial.outcome import TrialOutcome, build_outcome
 from quadriga.identification.predictors import reason
-from quadriga.shared.config.reference_trace import trace_sha256
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import config_sha256
 from quadriga.shared.errors import PredictorError, PredictorFileError, ProcessError
@@ -21,7 +20,7 @@ from quadriga.shared.runtime.clock import monotonic
 
 @dataclass(frozen=True, slots=True)
 class TrialJob:
-    """A trial: its group's configuration, predictor and trace, and the code it is meant for.
+    """A trial: its group's configuration and predictor, and the code it is meant for.
 
     `plugin` is the package that its planner comes with, or the controller of one's own that walks,
     see `foreign_origin`; "" for the project's own.
@@ -32,7 +31,6 @@ class TrialJob:
     config: Config
     fitted: Fitted
     versions: str
-    trace_sha256: str = ""
     plugin: str = ""
 
     @property
@@ -47,7 +45,7 @@ def walk_trial(
     """Walk a trial to its end or to the first fall, in this process unless `walk` does it.
 
     Raises:
-        ProcessError: this process has other code, libraries, planner or trace than the campaign.
+        ProcessError: this process has other code, libraries or planner than the campaign.
         ConfigError: the configuration cannot be walked.
         PredictorFileError: the predictor's file, or that of its data, is gone or damaged.
     """
@@ -62,13 +60,6 @@ def walk_trial(
             "a worker's planner or controller",
             plugin or "a built-in one",
             job.plugin or "a built-in one",
-            "install the same version there",
-        )
-    if trace_sha256(job.config) != job.trace_sha256:
-        raise ProcessError(
-            "a worker's reference.trace",
-            f"another {job.config.reference.trace}",
-            "the campaign's",
             "install the same version there",
         )
     config, begun = with_seed(job.config, job.seed), monotonic()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
@@ -23,7 +22,6 @@ from quadriga.experiments.predictors import Fitted, prepare_predictors
 from quadriga.experiments.trial.figures_of_merit import Figures
 from quadriga.experiments.trial.origin import code_and_libraries, foreign_origin
 from quadriga.experiments.trial.outcome import TrialOutcome, to_columns
-from quadriga.shared.config.reference_trace import trace_sha256
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import config_sha256
 from quadriga.shared.errors import ConfigError
@@ -78,7 +76,6 @@ def walk_campaign(
     with Ledger(out, manifest) as ledger, explain_write_errors(out):
         write_configs(out, plan.configs)
         done = {(row.group, row.seed) for row in ledger.rows}
-        traces = {group: trace_sha256(config) for group, config in plan.configs.items()}
         todo = [
             TrialJob(
                 group,
@@ -86,7 +83,6 @@ def walk_campaign(
                 plan.configs[group],
                 fitted[plan.configs[group]],
                 ledger.manifest.versions,
-                traces[group],
                 foreign_origin(plan.configs[group]),
             )
             for group, seed in plan.trials()
@@ -128,7 +124,7 @@ def build_manifest(plan: CampaignPlan, fitted: Mapping[Config, Fitted], typed: s
                 group.scenario,
                 group.variant,
                 group.swept,
-                config_digest(config),
+                config_sha256(config),
                 fitted[config].sha256,
                 tuple(sorted(plan.seeds)),
                 foreign_origin(config),
@@ -138,13 +134,6 @@ def build_manifest(plan: CampaignPlan, fitted: Mapping[Config, Fitted], typed: s
         ),
         versions=code_and_libraries(),
     )
-
-
-def config_digest(config: Config) -> str:
-    """Of the configuration, and of the trace that it names."""
-    trace = trace_sha256(config)
-    mine = config_sha256(config)
-    return mine if not trace else hashlib.sha256(f"{mine}{trace}".encode()).hexdigest()
 
 
 def _choose_workers(workers: Workers, out: Path) -> Callable[[Sequence[TrialJob]], Outcomes]:

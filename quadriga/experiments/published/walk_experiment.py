@@ -9,18 +9,14 @@ from rich.console import Console
 
 from quadriga.experiments.campaign.ledger import read_manifest
 from quadriga.experiments.campaign.manifest import FILE
-from quadriga.experiments.campaign.walk_trials import (
-    Workers,
-    build_manifest,
-    config_digest,
-    walk_campaign,
-)
+from quadriga.experiments.campaign.walk_trials import Workers, build_manifest, walk_campaign
 from quadriga.experiments.campaign.write_report import write_report
 from quadriga.experiments.plan import CampaignPlan, Group, build_plan
 from quadriga.experiments.predictors import prepare_predictors
 from quadriga.experiments.published.experiment import Experiment, Part
 from quadriga.experiments.published.published_trials import read_published_manifest, unpack_trials
 from quadriga.experiments.trial.origin import code_and_libraries
+from quadriga.shared.config.write import config_sha256
 from quadriga.shared.errors import ConfigError
 
 PartPlan = tuple[Part, CampaignPlan]  # one of an experiment's campaigns, and its trials
@@ -56,7 +52,7 @@ def config_digests(experiment: Experiment) -> dict[Group, str]:
         ConfigError: as `build_plans`.
     """
     return {
-        group: config_digest(config)
+        group: config_sha256(config)
         for _, plan in build_plans(experiment)
         for group, config in plan.configs.items()
     }

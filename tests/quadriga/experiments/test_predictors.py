@@ -12,8 +12,7 @@ from quadriga.experiments.plan import Group
 from quadriga.experiments.predictors import Fitted, prepare_predictors
 from quadriga.experiments.trial.origin import code_and_libraries
 from quadriga.identification.cache import predictor_path
-from quadriga.shared.config import reference_trace as trace
-from quadriga.shared.errors import PredictorFileError, ProcessError
+from quadriga.shared.errors import PredictorFileError
 from tests.quadriga.linear_data import config_of, put_data
 
 
@@ -51,17 +50,3 @@ def test_a_file_that_is_gone_is_an_error_and_no_row(
     predictor_path(config).write_bytes(b"not a predictor")
     with pytest.raises(PredictorFileError, match="a predictor that quadriga wrote"):
         prepare_predictors([config], Console(stderr=True))
-
-
-def test_another_trace_than_the_campaigns_is_an_error(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(trace, "scenario_folder", lambda: tmp_path)
-    file = tmp_path / "mine.csv"
-    file.write_text("t,vx,vy,wz\n0,0,0,0\n1,0.3,0,0\n", encoding="utf-8")
-    config = config_of(planner__kind="none", reference__trace="mine.csv")
-    sha256 = trace.trace_sha256(config)
-    job = TrialJob(Group("flat", "none", ()), 3, config, Fitted(), code_and_libraries(), sha256)
-    file.write_text("t,vx,vy,wz\n0,0,0,0\n1,0.2,0,0\n", encoding="utf-8")
-    with pytest.raises(ProcessError, match=r"reference\.trace"):
-        walk_trial(job)

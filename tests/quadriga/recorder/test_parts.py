@@ -15,7 +15,7 @@ KEY = "team/r1/state"
 
 
 def parts_of(path: Path, limits: Limits, clock: ManualClock) -> Parts:
-    return Parts(path, METADATA, 16, {"state": 1}, limits, clock.monotonic)
+    return Parts(path, METADATA, {"state": 1}, limits, clock.monotonic, chunk_kib=16)
 
 
 def test_a_new_file_begins_when_its_time_is_over(tmp_path: Path) -> None:
@@ -57,9 +57,7 @@ def test_no_file_exceeds_its_size(tmp_path: Path) -> None:
 
 def test_what_a_key_misses_while_it_is_silent_for_a_whole_file_is_counted(tmp_path: Path) -> None:
     clock, other = ManualClock(), "team/r2/state"
-    with Parts(
-        tmp_path / "run.mcap", METADATA, 16, {"state": 1}, Limits(seconds=2.0), clock.monotonic
-    ) as parts:
+    with parts_of(tmp_path / "run.mcap", Limits(seconds=2.0), clock) as parts:
         for tick in range(60):
             parts.write(KEY, encode(state(tick)), tick)
             if not 5 <= tick < 45:

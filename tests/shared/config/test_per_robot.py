@@ -6,26 +6,11 @@ from quadriga.shared.errors import ConfigError
 NAMES = ("r1", "r2", "r3")
 
 
-@pytest.mark.parametrize(
-    ("text", "parts"),
-    [
-        ("team", (1.0, 1.0, 1.0)),
-        ("r2", (0.0, 1.0, 0.0)),
-        ("r3, r1", (1.0, 0.0, 1.0)),
-        ("r1:6,r3:4", (6.0, 0.0, 4.0)),
-        ("r1,r2:0.5", (1.0, 0.5, 0.0)),
-    ],
-)
-def test_carriers_and_their_parts(text: str, parts: tuple[float, ...]) -> None:
-    assert carriers(text, NAMES) == parts
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [("", (0.8, 0.8, 0.8)), ("r2:0.3", (0.8, 0.3, 0.8)), ("r3: 0.5, r1:0.25", (0.25, 0.8, 0.5))],
-)
-def test_who_is_named_finds_another_friction(text: str, expected: tuple[float, ...]) -> None:
-    assert friction_of_robots(text, 0.8, NAMES) == expected
+def test_who_is_named_carries_a_part_or_finds_another_friction() -> None:
+    parts = {"team": (1.0, 1.0, 1.0), "r3, r1": (1.0, 0.0, 1.0), "r1:6,r2": (6.0, 1.0, 0.0)}
+    assert {text: carriers(text, NAMES) for text in parts} == parts
+    frictions = {"": (0.8, 0.8, 0.8), "r3: 0.5, r1:0.25": (0.25, 0.8, 0.5)}
+    assert {text: friction_of_robots(text, 0.8, NAMES) for text in frictions} == frictions
 
 
 WRONG = ("r4:1", "r1:1,", "r1:1,r1:2", "r1:", "r1:heavy", "r1:-1", "r1:nan", "1")

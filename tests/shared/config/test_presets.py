@@ -13,31 +13,15 @@ from quadriga.shared.config.sections import Config
 NAMED = [(section, name) for section, presets in PRESETS.items() for name in presets]
 
 
-@pytest.mark.parametrize("section", PRESETS)
-def test_presets_are_those_that_can_be_chosen(section: str) -> None:
-    keys = {item.name: item for item in fields(getattr(Config(), section))}
-    assert set(PRESETS[section]) == set(keys["preset"].metadata["choices"])
-    assert not PRESETS[section][str(keys["preset"].default)]
-
-
 @pytest.mark.parametrize(("section", "name"), NAMED)
 def test_a_preset_sets_its_keys_and_leaves_the_others(section: str, name: str) -> None:
     """Going through the same checks as a user's values: names, types and ranges."""
+    keys = {item.name: item for item in fields(getattr(Config(), section))}
+    assert set(PRESETS[section]) == set(keys["preset"].metadata["choices"])
+    assert not PRESETS[section][str(keys["preset"].default)]
     expected = asdict(getattr(Config(), section)) | {**PRESETS[section][name], "preset": name}
     found = load(None, {f"{section}.preset": name})
     assert asdict(found) == asdict(Config()) | {section: expected}
-    assert "preset" not in PRESETS[section][name]
-
-
-def test_the_plain_setting_is_without_what_the_robust_one_adds() -> None:
-    """Scheduled contacts, no integrators, and the paper's weights of the QP."""
-    plain = load(None, {"controller.preset": "plain"}).controller
-    assert not plain.contact_detection
-    assert plain.ki_z == plain.ki_xy == 0.0
-    assert not any((plain.reject_side_contacts, plain.track_sinking_trunk, plain.flight))
-    assert plain.tilt_length == plain.swing_weight == 1.0
-    assert plain.reflex_ms == plain.swing_delay == plain.slip_speed == 0
-    assert (plain.gamma_tau, plain.gamma_force, plain.gamma_defect) == (1e2, 1e3, 1e6)
 
 
 def test_the_papers_planner_has_its_weights_and_nothing_that_it_does_not_name() -> None:

@@ -30,29 +30,26 @@ def test_every_missing_message_is_counted(
     assert missing == len(gone)
 
 
-def test_what_is_no_gap() -> None:
-    track = TickTrack(10)
-    for tick in (-1, 50, 50, 60, 63, -1, 70, 9_000_000_000, 0, 10):
+@pytest.mark.parametrize(
+    ("period", "before", "ticks", "lost", "gaps"),
+    [
+        (10, -1, [-1, 50, 50, 60, 63, -1, 70, 9_000_000_000, 0, 10], 0, []),
+        (0, -1, [5, 500], 0, []),
+        (10, 90, [120], 2, [(90, 120)]),  # of the file before this one
+        *(
+            (1, -1, [*range(1100), odd, *range(1100, 1200), *range(1240, 1300)], 40, [(1199, 1240)])
+            for odd in (0, 400, 1099, 5_000_000)  # out of order
+        ),
+    ],
+)
+def test_what_is_a_gap_and_what_is_none(
+    period: int, before: int, ticks: list[int], lost: int, gaps: list[tuple[int, int]]
+) -> None:
+    track = TickTrack(period, before)
+    for tick in ticks:
         track.note(tick)
-    assert (track.lost, track.gaps, track.count, track.first) == (0, [], 10, 50)
-    unknown = TickTrack(0)
-    for tick in (5, 500):
-        unknown.note(tick)
-    assert unknown.lost == 0
-
-
-@pytest.mark.parametrize("odd", [0, 400, 1099, 5_000_000])
-def test_one_message_out_of_order_is_no_gap(odd: int) -> None:
-    track = TickTrack(1)
-    for tick in (*range(1100), odd, *range(1100, 1200), *range(1240, 1300)):
-        track.note(tick)
-    assert (track.lost, track.gaps, track.last) == (40, [(1199, 1240)], 1299)
-
-
-def test_a_file_goes_on_where_the_one_before_ended() -> None:
-    track = TickTrack(10, before=90)
-    track.note(120)
-    assert (track.lost, track.gaps, track.first) == (2, [(90, 120)], 120)
+    assert (track.lost, track.gaps, track.count) == (lost, gaps, len(ticks))
+    assert track.first == next(tick for tick in ticks if tick >= 0)
 
 
 def test_what_was_never_sent_is_not_lost() -> None:

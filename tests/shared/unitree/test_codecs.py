@@ -44,6 +44,7 @@ REPORT_AT = (
     "bit_flag 1144, adc_reel 1148, ntc1 1152, ntc2 1153, power_v 1156, power_a 1160, "
     "fan_frequency 1164, reserve 1172, crc 1176"
 )
+STEPS = {"q": 1e-6, "dq": 1e-5, "tau": 1 / 256, "kp": 1 / 32, "kd": 1 / 16}
 IDLE = MotorTargets(np.full(12, SERVO, dtype=np.uint8), *np.zeros((5, 12)))
 UDP = pytest.mark.parametrize("codec", [A1, GO1], ids=["a1", "go1"])
 ALL = pytest.mark.parametrize("codec", CODECS.values(), ids=CODECS)
@@ -118,7 +119,7 @@ def test_a_command_is_the_librarys_to_the_byte(vector: dict[str, Any]) -> None:
     assert codec.encode_command(targets) == wire
     read = codec.decode_command(wire)
     np.testing.assert_array_equal(read.mode, targets.mode)
-    for name, step in {"q": 1e-6, "dq": 1e-5, "tau": 1 / 256, "kp": 1 / 32, "kd": 1 / 16}.items():
+    for name, step in STEPS.items():
         np.testing.assert_allclose(getattr(read, name), given_[name], atol=step)
 
 
@@ -136,13 +137,19 @@ def test_a_report_is_read_as_the_library_reads_it(vector: dict[str, Any]) -> Non
     assert read.remote.hex() == vector["remote"]
 
 
-def test_the_layouts_are_those_of_c() -> None:
+def test_layouts_and_the_order_of_joints_are_those_of_c() -> None:
+    """FR FL RR RL on the wire, hip, thigh, calf of each; ours is FL FR RL RR."""
     assert len(VECTORS) == 96
     assert (GO2.command.itemsize, GO2.report.itemsize) == (812, 1180)
     for layout, places in ((GO2.command, COMMAND_AT), (GO2.report, REPORT_AT)):
         assert layout.fields is not None
         for name, at in (place.split() for place in places.split(", ")):
             assert layout.fields[name][1] == int(at)
+    targets = replace(IDLE, mode=np.full(12, ON, np.uint8), q=np.arange(12.0))
+    packet = np.frombuffer(GO2.encode_command(targets), GO2.command)[0]
+    assert packet["motor"]["q"][:12].tolist() == [3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8]
+    assert (packet["motor"]["q"][12:] == np.float32(2.146e9)).all()
+    assert set(packet["motor"]["mode"].tolist()) == {ON}
 
 
 @pytest.mark.parametrize("packet", [bytes.fromhex(text) for text in REAL["lowstate"]])
@@ -177,15 +184,13 @@ def test_a_command_comes_back_with_the_packets_resolution(
 ) -> None:
     read = codec.decode_command(codec.encode_command(targets))
     np.testing.assert_array_equal(read.mode, targets.mode)
-    np.testing.assert_allclose(read.q, targets.q, rtol=1e-7)
-    np.testing.assert_allclose(read.dq, targets.dq, rtol=1e-7)
-    for name, step in {"tau": 1 / 256, "kp": 1 / 32, "kd": 1 / 16}.items():
+    for name, step in STEPS.items():
         sent, got = getattr(targets, name), getattr(read, name)
-        if codec is GO2:
-            np.testing.assert_allclose(got, sent, rtol=1e-6)
-            continue
-        assert (np.abs(got) <= np.abs(sent)).all(), "never more than what was asked for"
-        np.testing.assert_allclose(got, sent, atol=step)
+        if codec is GO2 or name in ("q", "dq"):
+            np.testing.assert_allclose(got, sent, rtol=1e-7 if name in ("q", "dq") else 1e-6)
+        else:
+            assert (np.abs(got) <= np.abs(sent)).all(), "never more than what was asked for"
+            np.testing.assert_allclose(got, sent, atol=step)
 
 
 @ALL
@@ -230,16 +235,6 @@ def test_a_command_that_is_no_number_is_refused(name: str, value: float) -> None
     numbers[5] = value
     with pytest.raises(PacketError, match=f"motor command: {name}"):
         A1.encode_command(replace(IDLE, **dict[str, Any]({name: numbers})))
-
-
-def test_the_order_of_joints_is_the_robots() -> None:
-    """FR FL RR RL on the wire, hip, thigh, calf of each; ours is FL FR RL RR."""
-    idle = np.zeros(12)
-    targets = MotorTargets(np.full(12, ON, np.uint8), np.arange(12.0), idle, idle, idle, idle)
-    packet = np.frombuffer(GO2.encode_command(targets), GO2.command)[0]
-    assert packet["motor"]["q"][:12].tolist() == [3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8]
-    assert (packet["motor"]["q"][12:] == np.float32(2.146e9)).all()
-    assert set(packet["motor"]["mode"].tolist()) == {ON}
 
 
 @ALL

@@ -87,8 +87,7 @@ def test_what_is_written_is_read_to_the_byte(participant: DdsParticipant) -> Non
             sleep(0.001)
         assert reader.take() == packet
         assert reader.writer == witness.writer != first
-    assert participant.writers_seen_by(reader.handle) == 1
-    assert participant.readers_seen_by(writer.handle) == 1
+    assert reader.writers == writer.readers == 1
 
 
 def test_a_call_is_answered_with_its_number(participant: DdsParticipant) -> None:

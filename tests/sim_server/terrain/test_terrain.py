@@ -188,7 +188,7 @@ def test_terrain_follows_a_trace_and_not_the_speed_it_replaces_up_to_40_m(
     trace.write_text(f"t,vx,vy,wz\n0,{vx},0,0\n10,{vx},0,0\n", encoding="utf-8")
     places = formation(3, 0.9)
     for asked in (1.0, 0.0):
-        course = course_of(3, seconds, vx=asked, trace=inline_trace(trace))
+        course = course_of(3, seconds, vx=asked, trace=inline_trace(str(trace)))
         reach = min(40.0, abs(vx) * seconds)
         longest = np.abs([course.extent.x_low, course.extent.x_high]).max()
         assert reach + 2.0 < longest < reach + 7.0
