@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from quadriga.agents.inbox.inbox import Inbox
+from quadriga.agents.inbox import Inbox
 from quadriga.agents.shell import answer_states
 from quadriga.controller.motor_command import build_command
 from quadriga.controller.stepped import Step, SteppedController

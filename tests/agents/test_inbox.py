@@ -8,12 +8,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from quadriga.agents.inbox.inbox import Inbox
-from quadriga.agents.planning.interface import Expected
+from quadriga.agents.inbox import Inbox, format_message_id, list_messages, parse_message_id
+from quadriga.agents.planning.interface import NOTHING, Expected
+from quadriga.agents.step_io import Inputs
 from quadriga.shared.codec import encode
 from quadriga.shared.config.load import load
 from quadriga.shared.messages import (
+    Consumed,
     EStop,
     Event,
     Measurement,
@@ -27,8 +31,6 @@ from quadriga.shared.messages import (
 )
 from quadriga.shared.topics import ESTOP, REQUESTS, TABLE, Topic
 from tests.a1 import standing
-
-NOTHING = Expected()
 
 
 def arrivals(
@@ -67,12 +69,12 @@ def test_subscribes_to_what_it_needs_and_no_more() -> None:
     alone = {"team/r2/state", "team/reference", "team/sim/event"}
     alone |= {f"team/{word.name}" for word in REQUESTS}
     peers = {f"team/{r}/{t}" for r in ("r1", "r3") for t in ("plan", "measurement")}
-    assert {*arrivals(planner="none").keys} == alone
-    assert {*arrivals(planner="centralised").keys} == alone | {"team/r2/plan"}
+    assert {*arrivals(planner="none").topics} == alone
+    assert {*arrivals(planner="centralised").topics} == alone | {"team/r2/plan"}
     statuses = {"team/r1/status", "team/r3/status"}
-    assert {*arrivals("realtime", planner="none").keys} == alone | statuses
-    assert {*arrivals().keys} == alone | peers
-    assert {*arrivals(estimator="truth").keys} == alone | peers | {"team/sim/truth"}
+    assert {*arrivals("realtime", planner="none").topics} == alone | statuses
+    assert {*arrivals().topics} == alone | peers
+    assert {*arrivals(estimator="truth").topics} == alone | peers | {"team/sim/truth"}
 
 
 @pytest.mark.parametrize("topic", TABLE, ids=lambda topic: topic.name)
@@ -384,3 +386,94 @@ def test_in_real_time_statuses_of_the_others_are_handed_over_as_they_come() -> N
     assert [(n, said.mode) for n, said in inputs.statuses] == [("r1", "stand"), ("r3", "walk")]
     assert not inputs.bare
     assert box.pop_inputs(standing(105), NOTHING).bare
+
+
+@pytest.mark.parametrize("announced", [3, 7, 2**41])
+def test_an_announced_end_is_forgotten_once_time_goes_on(announced: int) -> None:
+    """A stranger may announce one, of any time: afterwards a pause of the team is no end."""
+    box = arrivals()
+    feed(box, ("r2/state", standing(5)), ("sim/event", Event(announced, 7, "stop", "", "", "end")))
+    assert box.ended
+    box.pop_state()
+    for tick in range(6, 1100):
+        feed(box, ("r2/state", standing(tick)))
+        box.pop_state()
+    assert not box.ended
+
+
+# ---- what an agent took in is told where no rule tells it, and only there
+
+PLAN = Plan(480, 0, 12, np.zeros((25, 12)), np.zeros((25, 6)), "solved", {}, 1)
+SAMPLE = Measurement(480, 0, np.zeros(12), np.zeros(6), np.ones(4))
+REFERENCE = Reference(500, 0, 0.5, 0.0, 0.0, 0.26)
+
+
+def of_pair(mode: str) -> Inbox:
+    """Of r2 that takes in r1's plans."""
+    return Inbox(load(None, {"world.mode": mode}), "r2", ("r1",))
+
+
+def full(tick: int) -> Inputs:
+    return Inputs(
+        standing(tick), (("r1", SAMPLE),), (("r1", PLAN),), (REFERENCE,), EStop(7, 7, "tripped")
+    )
+
+
+@given(
+    topic=st.sampled_from(["plan", "measurement", "reference", "estop", "sim/truth"]),
+    sender=st.sampled_from(["r1", "r10", "planner", "operator", "anyone", "sim"]),
+    first=st.integers(0, 1 << 40),
+    second=st.integers(0, 9),
+)
+def test_references_lead_back(topic: str, sender: str, first: int, second: int) -> None:
+    order = (first, second if topic == "plan" else 0)
+    assert parse_message_id(format_message_id((topic, sender), order)) == ((topic, sender), order)
+
+
+@given(text=st.text(max_size=20))
+def test_foreign_references_are_no_error(text: str) -> None:
+    found = parse_message_id(text)
+    assert found is None or len(found) == 2
+
+
+def test_in_real_time_all_that_was_taken_in_is_listed() -> None:
+    said = Status(500, 0, "walk", "", "", {}, {}, np.zeros(0), np.zeros(0))
+    told = replace(full(541), statuses=(("r1", said),))
+    taken = ["plan:r1:12.1", "measurement:r1:480", "reference:operator:500", "status:r1:500"]
+    taken.append("estop:anyone:7")
+    record = of_pair("realtime").record(540, told, NOTHING)
+    assert record == Consumed(541, 541_000_000, 0, 0, tuple(taken), ())
+    assert [parse_message_id(text) for text in taken] == list_messages(told)
+
+
+def test_a_step_that_took_in_the_next_state_alone_needs_no_record() -> None:
+    box = of_pair("realtime")
+    assert box.record(-1, Inputs(standing(0)), NOTHING) is None
+    passed = box.record(0, Inputs(standing(3)), NOTHING)
+    assert passed is not None
+    assert (passed.number, passed.passed, passed.taken) == (0, 2, ())
+    again = box.record(3, full(4), NOTHING)
+    assert again is not None
+    assert again.number == 1
+
+
+def test_lock_step_tells_only_the_unusual() -> None:
+    box = of_pair("lockstep")
+    box.take("team/r1/plan", encode(PLAN))
+    box.take("team/r1/measurement", encode(SAMPLE))
+    expected = Expected((12, 1), 480)
+    usual = box.pop_inputs(standing(520), expected)
+    assert len(list_messages(usual)) == 2
+    assert box.record(519, usual, expected) is None
+    # The same message once more would be a late one: it had been due before.
+    late = box.record(520, Inputs(standing(521), plans=(("r1", PLAN),)), NOTHING)
+    assert late is not None
+    assert late.taken == ("plan:r1:12.1",)
+    owed = box.record(521, Inputs(standing(522)), Expected((13, 0)))
+    assert owed is not None
+    assert (owed.taken, owed.owed) == ((), ("plan/r1",))
+    assert box.record(522, Inputs(standing(523)), NOTHING) is None
+    stopped = box.record(523, Inputs(standing(524), estop=EStop(0, 0, "")), NOTHING)
+    assert stopped is not None
+    assert stopped.taken == ("estop:anyone:0",)
+    assert box.record(524, Inputs(standing(526)), NOTHING) is not None
