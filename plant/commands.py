@@ -206,7 +206,10 @@ def hold_joints(state: State) -> Command:
     return Command(state.tick, state.stamp_ns, zero, state.q_joint, zero, kp, kd)
 
 
-def damp_joints(tick: int) -> Command:
-    """The command of a tick that damps all joints, as motors without a command are damped."""
+def damp_joints(tick: int, damping: float = MOTOR_DAMPING) -> Command:
+    """The command of a tick that damps all joints, by default as motors without a command do.
+
+    `damping` is in N·m·s/rad.
+    """
     zero = np.zeros(N_JOINTS)
-    return Command(tick, tick * 1_000_000, zero, zero, zero, zero, np.full(N_JOINTS, MOTOR_DAMPING))
+    return Command(tick, tick * 1_000_000, zero, zero, zero, zero, np.full(N_JOINTS, damping))
