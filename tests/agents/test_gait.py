@@ -1,4 +1,4 @@
-"""The trot's schedule and the nominal forces."""
+"""The trot's schedule, the phases of the planner's steps in it, and the nominal forces."""
 
 from __future__ import annotations
 
@@ -10,10 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from quadriga.agents.gait import (
+    gait_phase,
     half_cycle_stance,
+    horizon_stance,
+    phase_of,
     phase_offset_ms,
     scheduled_stance,
     stance_progress,
+    walking_steps,
 )
 from quadriga.shared.config.sections import Config, GaitConfig
 from quadriga.shared.robots.conventions import GRAVITY, Leg
@@ -72,10 +76,7 @@ def test_progress_and_half_say_the_same_as_the_schedule(
     assert progress == (since % gait.stance_ms) / gait.stance_ms
     expected = scheduled_stance(config, index, np.array([tick]))[0]
     np.testing.assert_array_equal(half_cycle_stance(half), expected)
-
-
-def test_standing_is_half_minus_one() -> None:
-    assert half_cycle_stance(-1).all()
+    assert half_cycle_stance(-1).all(), "it stands"
 
 
 @pytest.mark.parametrize("legs", range(1, 16))
@@ -94,3 +95,40 @@ def test_nominal_forces_of_many_instants_and_of_no_stance_at_all() -> None:
     assert forces.shape == (3, 12)
     assert not forces[2].any()
     np.testing.assert_array_equal(forces[1], nominal_forces(stance[1]))
+
+
+def test_ten_planning_steps_of_a_gait_of_400_ms_have_ten_phases() -> None:
+    """Stand until 300 ms; the first step is at 320 ms, 20 ms into the gait."""
+    config = Config()
+    phases = [phase_of(config, step, 10) for step in walking_steps(config)]
+    assert phases == list(range(10))
+    assert [phase_of(config, step, 2) for step in walking_steps(config)] == [0] * 5 + [1] * 5
+    assert {phase_of(config, step, 1) for step in range(40)} == {0}
+
+
+@settings(deadline=None)
+@given(st.integers(0, 10_000), st.integers(1, 40))
+def test_a_phase_returns_with_the_gait(tick: int, phases: int) -> None:
+    found = gait_phase(tick, 300, 200, phases)
+    assert 0 <= found < phases
+    assert gait_phase(tick + 400, 300, 200, phases) == found
+    assert gait_phase(tick + 200, 300, 200, 2) == 1 - gait_phase(tick, 300, 200, 2)
+
+
+@settings(deadline=None)
+@given(st.integers(300, 5000), st.integers(0, 1))
+def test_two_phases_are_the_two_diagonal_pairs(tick: int, robot: int) -> None:
+    stance = scheduled_stance(Config(), robot, np.array([tick]))[0]
+    assert stance[0] == (gait_phase(tick, 300, 200, 2) == robot)  # every second robot is opposite
+
+
+@pytest.mark.parametrize("stance_ms", [150, 200, 250])
+def test_equal_phases_have_equal_stance_patterns_once_as_fine_as_the_steps(stance_ms: int) -> None:
+    config = Config()
+    config = replace(config, gait=replace(config.gait, stance_ms=stance_ms))
+    finest = 2 * stance_ms // 10
+    patterns: dict[int, set[bytes]] = {}
+    for step in walking_steps(config):
+        pattern = horizon_stance(config, 0, step).tobytes()
+        patterns.setdefault(phase_of(config, step, finest), set()).add(pattern)
+    assert all(len(found) == 1 for found in patterns.values())

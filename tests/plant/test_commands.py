@@ -46,7 +46,7 @@ def test_the_command_of_the_tick_is_taken_once(box: CommandBox) -> None:
     assert box.take(KEY, command(5, 1.0), tick=5, oldest=5) == ""
     for key in ("team/r3/command", "other/r1/command", "team/r1/state"):
         assert box.take(key, command(5), tick=5, oldest=5) == ""
-    assert (box.invalid["r1"], box.errors, box.latest.keys()) == (0, {}, {"r1"})
+    assert (box.invalid["r1"], box.errors, list(box.latest)) == (0, {}, ["r1"])
 
 
 @pytest.mark.parametrize("wrong", [4, 6, MAX_TICK - 1])
