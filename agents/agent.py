@@ -8,30 +8,29 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import field, replace
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
 from quadriga.agents.controller.controller import control
 from quadriga.agents.controller.trunk import TrunkCommand
-from quadriga.agents.controller.whole_body_qp import WholeBodySolution
-from quadriga.agents.counters import count
+from quadriga.agents.controller.whole_body_qp import UNCONSTRAINED, WholeBodySolution
 from quadriga.agents.estimator.estimator import estimate, truth_row
 from quadriga.agents.estimator.robot_state import RobotState, gains_row
 from quadriga.agents.gait import Gait
 from quadriga.agents.modes import ModeRules, ResumeState, Statuses, newest_statuses, ramp
-from quadriga.agents.planner.solver import SolvedQp
+from quadriga.agents.planner.solver import SOLVED, SolvedQp
 from quadriga.agents.planner.team import Collected
 from quadriga.agents.planning.active_plan import Setpoint, setpoint_at
-from quadriga.agents.planning.interface import Expected, PlanningInputs
+from quadriga.agents.planning.interface import Expected, PlanningInputs, PlanningOutputs
 from quadriga.agents.planning.references import reference_at, remember_references
 from quadriga.agents.planning.registry import PlanningState, build_planning
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.stand_up import StandUp, StandUpRules
 from quadriga.agents.step_io import Inputs as Inputs
 from quadriga.agents.step_io import Outputs as Outputs
-from quadriga.agents.validate import Validator
-from quadriga.shared.codes import with_detail
+from quadriga.agents.validate import Validated, Validator
+from quadriga.shared.codes import code_of
 from quadriga.shared.config.sections import Config
 from quadriga.shared.messages import Command, Measurement, Reference
 from quadriga.shared.modes import (
@@ -39,7 +38,6 @@ from quadriga.shared.modes import (
     NO_ESTIMATE,
     PASSIVE,
     STAND,
-    STOPPED,
     STOPPING,
     WALK,
     Mode,
@@ -75,28 +73,6 @@ class AgentState:
     stand_up: StandUp | None = None
     readings: Array | None = None
     standing_since: Array | None = None
-
-
-@record
-class StepProblems:
-    """The QPs of one step, with their answers.
-
-    Attributes:
-        whole_body: of the controller.
-        planner: of the planning part; None if it solved none.
-    """
-
-    whole_body: WholeBodySolution
-    planner: SolvedQp | None
-
-
-class _Tick(NamedTuple):
-    """What a tick comes to, with what its QPs were posed of."""
-
-    state: AgentState
-    outputs: Outputs
-    asked: PlanningInputs
-    whole_body: WholeBodySolution
 
 
 class Agent:
@@ -155,23 +131,33 @@ class Agent:
 
     def step(self, state: AgentState, inputs: Inputs) -> tuple[AgentState, Outputs]:
         """Advance to the tick of `inputs.state`; that tick must be later than the last one."""
-        if self.stands_up(state, inputs):
+        if self._stands_up(state, inputs):
             return self._step_of_standing_up(state, inputs)
-        tick = self._tick(state, inputs)
-        return tick.state, tick.outputs
+        return self._tick(state, inputs)[:2]
 
-    def problems_of(self, state: AgentState, inputs: Inputs) -> StepProblems:
-        """The QPs that `step` solves for these arguments, also where a closed form answers them."""
-        tick = self._tick(state, inputs)
-        planner = self._planning.problem_of(state.planning, tick.asked)
-        return StepProblems(tick.whole_body, planner)
+    def problems_of(
+        self, state: AgentState, inputs: Inputs
+    ) -> tuple[WholeBodySolution, SolvedQp | None] | None:
+        """The QPs that `step` solves for these arguments, also where a closed form answers them.
 
-    def stands_up(self, state: AgentState, inputs: Inputs) -> bool:
-        """Whether the robot, which was damped, stands up in the step of these arguments."""
+        That of the controller, and that of planning, if it solved one; None of a step by which the
+        robot stands up.
+        """
+        if self._stands_up(state, inputs):
+            return None
+        *_, asked, solution = self._tick(state, inputs)
+        return solution, self._planning.problem_of(state.planning, asked)
+
+    def _stands_up(self, state: AgentState, inputs: Inputs) -> bool:
         return state.stand_up is not None or self._stand_up.begins(state.mode, inputs)
 
-    def _tick(self, state: AgentState, inputs: Inputs) -> _Tick:
-        """Validate, estimate, plan, control; the stops of all of these are resolved at the end."""
+    def _tick(
+        self, state: AgentState, inputs: Inputs
+    ) -> tuple[AgentState, Outputs, PlanningInputs, WholeBodySolution]:
+        """Validate, estimate, plan, control; the stops of all of these are resolved at the end.
+
+        Besides the step's results it gives what its QPs were posed of.
+        """
         tick = inputs.state.tick
         dt = 1e-3 if state.tick < 0 else min(_LONGEST_DT, 1e-3 * (tick - state.tick))
 
@@ -227,7 +213,7 @@ class Agent:
             references=references,
             last_tau=tau,
             failures=failures,
-            counters=count(state.counters, planned, solution, read),
+            counters=_count(state.counters, planned, solution, read),
             resume=self._modes.remember(resume, mode, inputs, inputs_ok=inputs_ok),
             statuses=statuses,
             readings=read.memory,
@@ -243,7 +229,7 @@ class Agent:
             {"reference": float(reference_age), **planned.ages_ms},
             planned.planner_ns,
         )
-        return _Tick(new, outputs, asked, solution)
+        return new, outputs, asked, solution
 
     def _step_of_standing_up(self, state: AgentState, inputs: Inputs) -> tuple[AgentState, Outputs]:
         """Stand up by a tick: nothing is estimated or planned before the robot stands."""
@@ -253,9 +239,6 @@ class Agent:
         mode, stand_up, command = self._stand_up.step(
             state.mode, state.stand_up, inputs, may_move=may_move
         )
-        if inputs.stop is not None:
-            stop = Stop(STOPPING, with_detail(STOPPED, inputs.stop.reason))
-            mode = resolve_stops(mode, tick, [stop])
         new = AgentState(
             tick,
             mode,
@@ -320,10 +303,29 @@ class Agent:
 
     def _command(self, tick: int, tau: Array, mode: Mode, *, solved: bool) -> Command:
         """The motor command: torques, with damping where they are not this tick's, or damping."""
-        row = np.zeros(60)  # tau, q_des, v_des, kp, kd
-        passive = mode.passive
-        if passive or not solved:
-            row[48:] = self._damping
-        if not passive:
-            row[:12] = tau
+        row = np.zeros(60)
+        if mode.passive or not solved:
+            row[Command.CUTS["kd"]] = self._damping
+        if not mode.passive:
+            row[Command.CUTS["tau"]] = tau
         return Command.from_row(tick, tick * 1_000_000, row)
+
+
+def _count(
+    counters: Mapping[str, int],
+    planned: PlanningOutputs,
+    solution: WholeBodySolution,
+    read: Validated,
+) -> Mapping[str, int]:
+    """The counters after a tick: whatever was out of the ordinary."""
+    names = ["imu_invalid"] if read.imu else []
+    if read.encoders:
+        names.append("encoder_invalid")
+    if planned.plan is not None and planned.plan.status != SOLVED:
+        names.append(f"plan_{code_of(planned.plan.status)}")
+    names += planned.unusual
+    if solution.status != UNCONSTRAINED:
+        names.append("qp_constrained" if solution.solved else "qp_failed")
+    if not names:
+        return counters
+    return {**counters, **{name: counters.get(name, 0) + 1 for name in names}}

@@ -121,11 +121,7 @@ class ModeRules:
             statuses: of the others.
             reference_age: of the operator's reference in force, ms.
         """
-        stops: list[Stop] = []
-        if inputs.estop is not None:
-            stops.append(Stop(ESTOP, with_detail(ESTOP, inputs.estop.reason)))
-        if inputs.stop is not None:
-            stops.append(Stop(STOPPING, with_detail(STOPPED, inputs.stop.reason)))
+        stops = requested_stops(inputs)
         if mode.name != WALK:
             return stops
         if reference_age > REFERENCE.max_age_ms:
@@ -187,6 +183,16 @@ class ModeRules:
         return ResumeState(since, requested, resume.resumed, stopped)
 
 
+def requested_stops(inputs: Inputs) -> list[Stop]:
+    """The stops that people have asked for."""
+    stops: list[Stop] = []
+    if inputs.estop is not None:
+        stops.append(Stop(ESTOP, with_detail(ESTOP, inputs.estop.reason)))
+    if inputs.stop is not None:
+        stops.append(Stop(STOPPING, with_detail(STOPPED, inputs.stop.reason)))
+    return stops
+
+
 def newest_statuses(known: Statuses, arrived: Iterable[tuple[str, Status]]) -> Statuses:
     """The newest status of each robot; of several that arrived at once the last counts."""
     newest = dict(arrived)
@@ -203,13 +209,15 @@ def ramp(
     begun = resume.resumed
     if begun < 0 or tick - begun > RAMP_MS + _LOOKED_BACK_MS:
         return references
-    return tuple(_share(item, min(1.0, max(0, item.tick - begun) / RAMP_MS)) for item in references)
+    return tuple(slowed(item, min(1.0, max(0, item.tick - begun) / RAMP_MS)) for item in references)
 
 
-def _share(item: Reference, share: float) -> Reference:
+def slowed(reference: Reference, share: float) -> Reference:
+    """A reference with a share of its speed."""
     if share == 1.0:
-        return item
-    return replace(item, vx=share * item.vx, vy=share * item.vy, wz=share * item.wz)
+        return reference
+    vx, vy, wz = share * reference.vx, share * reference.vy, share * reference.wz
+    return replace(reference, vx=vx, vy=vy, wz=wz)
 
 
 def change_event(before: Mode, after: Mode, tick: int, robot: str) -> Event | None:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Final
 
 from quadriga.agents.agent import Agent
-from quadriga.agents.inbox.inbox import Inbox
+from quadriga.agents.inbox import Inbox
 from quadriga.agents.planner.team import Collected
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.predictor.store import predictor_sha256

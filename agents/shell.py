@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Generic, Protocol, TypeVar
 
-from quadriga.agents.inbox.inbox import Inbox, Source
-from quadriga.agents.inbox.intake_log import Intake
+from quadriga.agents.inbox import Inbox, Source
 from quadriga.agents.modes import change_event
 from quadriga.agents.planning.interface import NOTHING, Expected
 from quadriga.agents.step_io import Inputs, Outputs
@@ -17,51 +16,43 @@ from quadriga.shared.bus.session import HERE, POLL, READY, Bus
 from quadriga.shared.codec import encode
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import PEER_TIMEOUT
-from quadriga.shared.messages import State
+from quadriga.shared.messages import Message, State
 from quadriga.shared.modes import Mode
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns
 from quadriga.shared.runtime.scheduling import at_work
 from quadriga.shared.runtime.signals import interruptible
-from quadriga.shared.topics import AGENT_EVENT, COMMAND, INPUTS, MEASUREMENT, PLAN, STATUS
+from quadriga.shared.topics import AGENT_EVENT, COMMAND, INPUTS, MEASUREMENT, PLAN, STATUS, Topic
 
 
-class RememberedTick(Protocol):
-    """What the shell looks at of all that an agent remembers between ticks."""
+class Remembered(Protocol):
+    """What the shell looks at of all that an agent remembers: its last tick, −1 before the first.
 
-    @property
-    def tick(self) -> int:
-        """The newest that has been answered, −1 before the first."""
-        ...
+    And what the robot is doing.
+    """
 
     @property
-    def mode(self) -> Mode:
-        """What the robot is doing."""
-        ...
+    def tick(self) -> int: ...
+
+    @property
+    def mode(self) -> Mode: ...
 
 
-S = TypeVar("S", bound=RememberedTick)
+S = TypeVar("S", bound=Remembered)
 
 
 class SteppedAgent(Protocol[S]):
-    """Whatever answers a robot's states, tick by tick.
+    """Whatever answers the states of `robot`, tick by tick: `Agent`, or a user's own function.
 
-    Attributes:
-        robot: the robot's name.
+    `expected` is what lock-step waits for before the step of a tick.
     """
 
     robot: str
 
-    def initial(self) -> S:
-        """What it remembers before the first tick."""
-        ...
+    def initial(self) -> S: ...
 
-    def expected(self, tick: int) -> Expected:
-        """What lock-step waits for before the step of `tick`."""
-        ...
+    def expected(self, tick: int) -> Expected: ...
 
-    def step(self, state: S, inputs: Inputs) -> tuple[S, Outputs]:
-        """Advance to the tick of `inputs.state`; that tick must be later than the last one."""
-        ...
+    def step(self, state: S, inputs: Inputs) -> tuple[S, Outputs]: ...
 
 
 def answer_states(
@@ -89,10 +80,9 @@ def answer_states(
         KeyboardInterrupt: it is stopped before it is ready.
     """
     with Bus.open(config.bus, config.team.name, agent.robot, stopped) as bus:
-        for key in inbox.keys:
+        for key in inbox.topics:
             bus.subscribe(key)
-        info = ProcessInfo(bus, config, predictor_sha256)
-        if not join(bus, config, stopped, info):
+        if not join(bus, config, stopped, ProcessInfo(bus, config, predictor_sha256)):
             return
         with interruptible(stopped):
             rehearse()
@@ -115,7 +105,6 @@ class AgentShell(Generic[S]):
         }
         self._put[AGENT_EVENT] = bus.publisher(AGENT_EVENT.key(team, agent.robot), urgent=realtime)
         self._telemetry = Telemetry(config.estimator.kind, paced=realtime)
-        self._intake = Intake(config, inbox)
         self._lead = Liveness(bus, config)
         self._given_up: dict[Source, int] = {}  # messages received of a source when given up
 
@@ -131,64 +120,49 @@ class AgentShell(Generic[S]):
             else:
                 self._lead.poll(memory.tick)
 
-    def _receive(self, timeout: float) -> bool:
-        """Take in all that has come; False if nothing came within `timeout` seconds."""
+    def _receive(self, timeout: float) -> None:
+        """Take in all that has come, or comes within `timeout` seconds."""
         first = self._bus.get(timeout)
-        if first is None:
-            return False
-        self._inbox.take(*first)
-        for packet in self._bus.drain():
-            self._inbox.take(*packet)
-        return True
+        if first is not None:
+            self._inbox.take(*first)
+            for packet in self._bus.drain():
+                self._inbox.take(*packet)
 
     def _answer(self, memory: S, state: State) -> S:
-        begun = monotonic_ns()
-        self._telemetry.note_state(state.tick, begun)
-        expected = self._agent.expected(state.tick)
-        inputs = self._gather_inputs(state, expected)
-        before = memory
-        memory, outputs = self._agent.step(before, inputs)
-        self._put[COMMAND](encode(outputs.command))
+        """One tick: wait for what is due, step, publish."""
+        tick, begun = state.tick, monotonic_ns()
+        self._telemetry.note_state(tick, begun)
+        expected = self._agent.expected(tick)
+        if self._lockstep and expected is not NOTHING:
+            self._await_messages(tick, expected)
+        inputs = self._inbox.pop_inputs(state, expected)
+        after, outputs = self._agent.step(memory, inputs)
+        self._publish(COMMAND, outputs.command)
         self._telemetry.note_step(outputs, monotonic_ns() - begun)
-        self._publish_rest(state.tick, outputs)
-        self._publish_intake(before.tick, inputs, expected)
-        event = change_event(before.mode, memory.mode, state.tick, self._agent.robot)
-        if event is not None:
-            self._put[AGENT_EVENT](encode(event))
-        return memory
+        self._publish(MEASUREMENT, outputs.measurement)
+        self._publish(PLAN, outputs.plan)
+        self._publish(STATUS, self._telemetry.status(tick, outputs, self._inbox.counters))
+        self._publish(INPUTS, self._inbox.record(memory.tick, inputs, expected))
+        self._publish(AGENT_EVENT, change_event(memory.mode, after.mode, tick, self._agent.robot))
+        return after
 
-    def _publish_rest(self, tick: int, outputs: Outputs) -> None:
-        if outputs.measurement is not None:
-            self._put[MEASUREMENT](encode(outputs.measurement))
-        if outputs.plan is not None:
-            self._put[PLAN](encode(outputs.plan))
-        status = self._telemetry.status(tick, outputs, self._inbox.counters)
-        if status is not None:
-            self._put[STATUS](encode(status))
+    def _publish(self, topic: Topic, message: Message | None) -> None:
+        if message is not None:
+            self._put[topic](encode(message))
 
-    def _publish_intake(self, last: int, inputs: Inputs, expected: Expected) -> None:
-        """Publish what was taken in, where the rules do not determine it."""
-        record = self._intake.record(last, inputs, expected)
-        if record is not None:
-            self._put[INPUTS](encode(record))
-
-    def _gather_inputs(self, state: State, expected: Expected) -> Inputs:
-        """The inputs of a step; in lock-step once all expected messages have come.
+    def _await_messages(self, tick: int, expected: Expected) -> None:
+        """Wait for the messages that a step expects.
 
         A source that is silent for the time-out is not waited for again until it sends a message.
         """
-        if self._lockstep and expected is not NOTHING:
-            deadline = monotonic() + PEER_TIMEOUT
-            missing = self._missing_sources(state.tick, expected)
-            while missing:
-                left = deadline - monotonic()
-                if left <= 0.0:
-                    self._given_up |= {source: self._inbox.received[source] for source in missing}
-                    self._inbox.counters["waits_given_up"] += 1
-                    break
-                self._receive(min(left, POLL))
-                missing = self._missing_sources(state.tick, expected)
-        return self._inbox.pop_inputs(state, expected)
+        deadline, received = monotonic() + PEER_TIMEOUT, self._inbox.received
+        while missing := self._missing_sources(tick, expected):
+            left = deadline - monotonic()
+            if left <= 0.0:
+                self._given_up |= {source: received[source] for source in missing}
+                self._inbox.counters["waits_given_up"] += 1
+                return
+            self._receive(min(left, POLL))
 
     def _missing_sources(self, tick: int, expected: Expected) -> set[Source]:
         """Sources that have not sent their message yet and are worth waiting for."""

@@ -7,16 +7,17 @@ torques. Only once they are there, and the trunk is level, the robot stands.
 from __future__ import annotations
 
 import math
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
+from quadriga.agents.modes import requested_stops
 from quadriga.agents.step_io import Inputs
+from quadriga.plant.commands import damp_joints
 from quadriga.shared.codes import with_detail
 from quadriga.shared.config.sections import BRIDGED, Config
 from quadriga.shared.messages import Command, State
 from quadriga.shared.modes import (
-    ESTOP,
     FALL,
     NO_ESTIMATE,
     NOT_UP,
@@ -56,14 +57,6 @@ class StandUp:
     motion: Motion | None = None
 
 
-class StandUpStep(NamedTuple):
-    """What a tick gives; `stand_up` is None once the robot no longer stands up."""
-
-    mode: Mode
-    stand_up: StandUp | None
-    command: Command
-
-
 class StandUpRules:
     """Fixed data of how a robot stands up; what it gives depends on arguments alone.
 
@@ -88,7 +81,7 @@ class StandUpRules:
 
     def step(
         self, mode: Mode, stand_up: StandUp | None, inputs: Inputs, *, may_move: bool
-    ) -> StandUpStep:
+    ) -> tuple[Mode, StandUp | None, Command]:
         """Stand up by a tick.
 
         Args:
@@ -96,28 +89,27 @@ class StandUpRules:
             stand_up: what is remembered; None: the robot begins at this tick.
             inputs: of this tick.
             may_move: whether the other robots rest.
+
+        Returns:
+            The mode after it, what is to be remembered while the robot stands up, the command.
         """
         state, tick = inputs.state, inputs.state.tick
         if stand_up is None:
             by = "" if inputs.reset is None else inputs.reset.by
             mode = Mode(STANDING_UP, tick, with_detail(RESET, by)[:REASON_MOST])
             stand_up = StandUp(state.q_joint)
-        stops = []
-        if inputs.estop is not None:
-            stops.append(Stop(ESTOP, with_detail(ESTOP, inputs.estop.reason)))
+        stops = requested_stops(inputs)
         if trouble := self._find_trouble(stand_up, state):
             stops.append(Stop(PASSIVE, trouble))
         mode = resolve_stops(mode, tick, stops)
         if mode.passive:
-            row = np.zeros(60)
-            row[Command.CUTS["kd"]] = self._damping
-            return StandUpStep(mode, None, Command.from_row(tick, tick * 1_000_000, row))
+            return mode, None, damp_joints(tick, self._damping)
         if stand_up.motion is None and may_move:
             stand_up = StandUp(stand_up.held, tick, way_up(state.q_joint, self._robot, _SECONDS))
         command = self._command(stand_up, state)
         if self._since_motion(stand_up, tick) >= _SETTLE_MS and self._is_up(state):
-            return StandUpStep(Mode(STAND, tick, mode.reason), None, command)
-        return StandUpStep(mode, stand_up, command)
+            return Mode(STAND, tick, mode.reason), None, command
+        return mode, stand_up, command
 
     def _find_trouble(self, stand_up: StandUp, state: State) -> str:
         """Why a robot cannot stand up; "" if it can so far."""

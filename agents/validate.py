@@ -18,7 +18,7 @@ import numpy as np
 from quadriga.agents.estimator.rigid_body import foot_forces
 from quadriga.shared.codes import with_detail
 from quadriga.shared.config.sections import Config
-from quadriga.shared.messages import Command, State, cuts_of
+from quadriga.shared.messages import Command, State
 from quadriga.shared.modes import ENCODER_LOST, IMU_LOST
 from quadriga.shared.robots.conventions import (
     GRAVITY,
@@ -57,37 +57,27 @@ _ACCEL: Final = State.CUTS["imu_accel"]
 _N_STATE: Final = max(cut.stop for cut in State.CUTS.values())
 
 
-class ValidationLayout(NamedTuple):
-    """Where the row of what is remembered keeps what.
-
-    Attributes:
-        read: the last state, as it was read, `State.row`.
-        valid: the last valid readings, likewise.
-        agrees: for how long each encoder, attitude with gyro, and the accelerometer have agreed
-            with themselves, (14,), ms.
-        missing: for how long each has not been valid, (14,), ms.
-        same: for how long the IMU has read the same, ms.
-        up: specific force along the vertical by the IMU's own attitude, filtered, m/s².
-    """
-
-    read: slice
-    valid: slice
-    agrees: slice
-    missing: slice
-    same: int
-    up: int
-
-
-_SIZES: Final = {"read": _N_STATE, "valid": _N_STATE, "agrees": _N_SENSORS, "missing": _N_SENSORS}
-_SIZE: Final = sum(_SIZES.values()) + 2
-_ROW: Final = ValidationLayout(**cuts_of(_SIZES), same=_SIZE - 2, up=_SIZE - 1)
+# What is remembered of the readings from one tick to the next, see `RobotState` of such rows.
+_MEMORY: Final = np.dtype(
+    (
+        np.record,
+        [
+            ("read", float, _N_STATE),  # the last state, as it was read, `State.row`
+            ("valid", float, _N_STATE),  # the last valid readings, likewise
+            ("agrees", float, _N_SENSORS),  # for how long each has agreed with itself, ms
+            ("missing", float, _N_SENSORS),  # for how long each has not been valid, ms
+            ("same", float),  # for how long the IMU has read the same, ms
+            ("up", float),  # specific force along the IMU's own vertical, filtered, m/s²
+        ],
+    )
+)
 
 
 class Validated(NamedTuple):
     """What is known of the sensors after a tick.
 
     Attributes:
-        memory: for the next tick, see `ValidationLayout`.
+        memory: for the next tick, a row of `_MEMORY`.
         state: what was read, with the last valid readings in place of invalid ones.
         imu: whether a reading of the IMU is invalid now.
         encoders: joints, of 0 … 11, whose encoder's reading is invalid now.
@@ -133,19 +123,19 @@ class Validator:
             state: what was read.
             dt: time since the last reading, s.
         """
-        memory = _first(state.row) if memory is None else memory.copy()
-        if _validate(memory, state.row, self._lower, self._upper, dt):
-            return Validated(memory, state, imu=False, encoders=(), lost="")
-        missing = memory[_ROW.missing]
-        invalid = np.flatnonzero(missing > 0.0).tolist()
+        row = _first(state.row) if memory is None else memory.copy()
+        if _validate(row, state.row, self._lower, self._upper, dt):
+            return Validated(row, state, imu=False, encoders=(), lost="")
+        known = row.view(_MEMORY)[0]
+        invalid = np.flatnonzero(known.missing > 0.0).tolist()
         encoders = tuple(joint for joint in invalid if joint < N_JOINTS)
-        imu, row = len(encoders) < len(invalid), state.row.copy()
+        imu, stands_in = len(encoders) < len(invalid), state.row.copy()
         if imu:
-            _replace_imu(row, memory[_ROW.valid], missing[_IMU] > 0.0)
+            _replace_imu(stands_in, known.valid, known.missing[_IMU] > 0.0)
         for joint in encoders:
-            row[_Q][joint], row[_V][joint] = memory[_ROW.valid][_Q][joint], 0.0
-        valid = State.from_row(state.tick, state.stamp_ns, row)
-        return Validated(memory, valid, imu, encoders, self._loss(missing))
+            stands_in[_Q][joint], stands_in[_V][joint] = known.valid[_Q][joint], 0.0
+        valid = State.from_row(state.tick, state.stamp_ns, stands_in)
+        return Validated(row, valid, imu, encoders, self._loss(known.missing))
 
     def _loss(self, missing: Array) -> str:
         """Why the robot can walk no more; "": it can."""
@@ -183,91 +173,76 @@ class Validator:
 def standing_torques(robot: RobotSpec) -> Array:
     """Torques of the motors of a robot that stands on four feet, legs without mass, (12,), N·m."""
     weight = np.array([0.0, 0.0, GRAVITY * robot.geometry.mass / N_LEGS])
-    torques = np.zeros(N_JOINTS)
-    for leg in range(N_LEGS):
-        joints = slice(3 * leg, 3 * leg + 3)
-        forces = np.empty((3, 3))  # of a unit torque of each joint
-        for joint in range(3):
-            unit = np.zeros(N_JOINTS)
-            unit[3 * leg + joint] = -1.0
-            forces[:, joint] = foot_forces(unit, robot.q_stand, robot.geometry)[leg]
-        torques[joints] = np.linalg.solve(forces, weight)
+    units = np.tile(np.eye(3), N_LEGS)
+    forces = [foot_forces(-unit, robot.q_stand, robot.geometry) for unit in units]
+    torques: Array = np.linalg.solve(np.stack(forces, axis=-1), weight).ravel()
     return torques
 
 
-def _first(row: Array) -> Array:
+def _first(state: Array) -> Array:
     """What is remembered before the first tick: nothing is doubted, the trunk is level."""
-    memory = np.zeros(_SIZE)
-    memory[_ROW.read] = memory[_ROW.valid] = row
-    memory[_ROW.agrees] = AGREES_MS
-    memory[_ROW.valid][_QUAT] = 1.0, 0.0, 0.0, 0.0
-    memory[_ROW.up] = GRAVITY
-    return memory
+    row = np.zeros(_MEMORY.itemsize // 8)
+    memory = row.view(_MEMORY)[0]
+    memory.read = memory.valid = state
+    memory.valid[_QUAT] = 1.0, 0.0, 0.0, 0.0
+    memory.agrees, memory.up = AGREES_MS, GRAVITY
+    return row
 
 
 @compiled
-def _validate(memory: Array, state: Array, lower: Array, upper: Array, dt: float) -> bool:
-    """Whether all readings of a tick are valid; `memory` is brought up to date."""
-    last, valid, ms = memory[_ROW.read], memory[_ROW.valid], 1e3 * dt
-    agrees, missing = memory[_ROW.agrees], memory[_ROW.missing]
-    resumed, whole = dt > _PAUSE, True
+def _validate(row: Array, state: Array, lower: Array, upper: Array, dt: float) -> bool:
+    """Whether all readings of a tick are valid; `row`, of `_MEMORY`, is brought up to date."""
+    memory, ms, whole = row.view(_MEMORY)[0], 1e3 * dt, True
     jump = _JUMP + _FASTEST * max(0.0, dt - 1e-3)
     for index in range(_N_SENSORS):
         if index == _IMU:
-            sound = _is_sound_attitude(memory, state, dt, resumed)
+            sound = _is_sound_attitude(memory, state, dt)
         elif index == _FORCE:
             sound = 0.0 < np.max(np.abs(state[_ACCEL])) < _ACCEL_MAX
         else:
-            q, v, q0, v0 = state[_Q][index], state[_V][index], last[_Q][index], last[_V][index]
-            follows = abs(q - q0 - 0.5 * dt * (v + v0)) <= jump
-            near = missing[index] == 0.0 or abs(q - valid[_Q][index]) <= _RETURN
+            q, v, last = state[_Q][index], state[_V][index], memory.read
+            follows = abs(q - last[_Q][index] - 0.5 * dt * (v + last[_V][index])) <= jump
+            near = memory.missing[index] == 0.0 or abs(q - memory.valid[_Q][index]) <= _RETURN
             possible = lower[index] <= q <= upper[index] and np.isfinite(v)
-            sound = possible and (resumed or (follows and near))
-        agrees[index] = min(agrees[index] + ms, 1e6) if sound else 0.0
-        if agrees[index] < AGREES_MS:
-            missing[index] += ms
+            sound = possible and (dt > _PAUSE or (follows and near))
+        memory.agrees[index] = min(memory.agrees[index] + ms, 1e6) if sound else 0.0
+        if memory.agrees[index] < AGREES_MS:
+            memory.missing[index] += ms
             whole = False
             continue
-        missing[index] = 0.0
+        memory.missing[index] = 0.0
         if index == _IMU:
-            valid[_QUAT] = state[_QUAT]
+            memory.valid[_QUAT] = state[_QUAT]
         elif index < N_JOINTS:
-            valid[_Q][index] = state[_Q][index]
-    last[:] = state
+            memory.valid[_Q][index] = state[_Q][index]
+    memory.read[:] = state
     return whole
 
 
 @compiled
-def _is_sound_attitude(memory: Array, state: Array, dt: float, resumed: bool) -> bool:
+def _is_sound_attitude(memory: np.record, state: Array, dt: float) -> bool:
     """Whether attitude and gyro can be, and follow from what they were before."""
-    last, quat, gyro, accel = memory[_ROW.read], state[_QUAT], state[_GYRO], state[_ACCEL]
+    last, quat, gyro, accel = memory.read, state[_QUAT], state[_GYRO], state[_ACCEL]
     same = True
     for index in range(_QUAT.start, _ACCEL.stop):
         same = same and state[index] == last[index]
-    memory[_ROW.same] = memory[_ROW.same] + 1e3 * dt if same else 0.0
-    if memory[_ROW.same] >= _SAME_MS and np.max(np.abs(gyro)) > _TURNS:
+    memory.same = memory.same + 1e3 * dt if same else 0.0
+    if memory.same >= _SAME_MS and np.max(np.abs(gyro)) > _TURNS:
         return False
     if not (np.isfinite(np.sum(gyro)) and _is_attitude(quat)):
         return False
     if 0.0 < np.max(np.abs(accel)) < _ACCEL_MAX:
-        up = np.sum(_vertical(quat) * accel)
-        memory[_ROW.up] += dt / (_UP_TIME + dt) * (up - memory[_ROW.up])
-    doubted = memory[_ROW.missing][_IMU] > 0.0  # one that falls freely feels hardly anything
-    if memory[_ROW.up] < (-_UP_LEAST if doubted else _UP_LEAST):
+        memory.up += dt / (_UP_TIME + dt) * (np.sum(_vertical(quat) * accel) - memory.up)
+    doubted = memory.missing[_IMU] > 0.0  # one that falls freely feels hardly anything
+    if memory.up < (-_UP_LEAST if doubted else _UP_LEAST):
         return False
-    if resumed or not _is_attitude(last[_QUAT]):
-        return resumed
+    if dt > _PAUSE or not _is_attitude(last[_QUAT]):
+        return dt > _PAUSE
     # Half the sine of the angle between what follows by the gyro and what is read.
     a, b, c = 0.25 * dt * (last[_GYRO] + gyro)
     w, x, y, z = last[_QUAT]
-    expected = np.array(
-        [
-            w - x * a - y * b - z * c,
-            x + w * a + y * c - z * b,
-            y + w * b + z * a - x * c,
-            z + w * c + x * b - y * a,
-        ]
-    )
+    turned = (-x * a - y * b - z * c, w * a + y * c - z * b, w * b + z * a - x * c)
+    expected = last[_QUAT] + np.array([*turned, w * c + x * b - y * a])
     norms = np.sqrt(np.sum(expected * expected) * np.sum(quat * quat))
     return bool(abs(np.sum(expected * quat)) >= np.cos(0.5 * _JUMP) * norms)
 

@@ -73,34 +73,32 @@ def describe_excess(command: Command, limits: CommandLimits) -> str:
 class CommandBox:
     """The newest valid command of every robot, and what was refused.
 
+    Args:
+        team: the team's name.
+        names: of its robots whose commands count.
+        robot: their kind.
+
     Attributes:
         latest: by robot, in no particular order.
-        errors: by robot, what was wrong with the latest that no process of this project sends.
+        invalid: number of a robot's packets that no process of this project sends.
+        errors: by robot, what was wrong with the latest of those.
+        refused: by robot, what was wrong with the latest command, if it does not count.
     """
 
     def __init__(self, team: str, names: Iterable[str], robot: RobotSpec) -> None:
-        """Of the robots `names` of a team, all of the kind `robot`."""
-        self._robots = {COMMAND.key(team, name): name for name in names}
+        self.robots = {COMMAND.key(team, name): name for name in names}
         self._limits = command_limits(robot)
         self.latest: dict[str, Command] = {}
+        self.invalid: Counter[str] = Counter()
         self.errors: dict[str, str] = {}
-        self._invalid: Counter[str] = Counter()
-        self._whys: dict[str, str] = {}  # why each robot's latest command was refused
+        self.refused: dict[str, str] = {}
         # The first one read compiles or loads what reads it, which is not for the first tick.
         decode(encode(Command(0, 0, *np.zeros((5, N_JOINTS)))), Command)
-
-    def invalid_of(self, robot: str) -> int:
-        """Number of a robot's packets that were no valid command, or one that nobody can mean."""
-        return self._invalid[robot]
 
     def tick_of(self, robot: str) -> int:
         """Tick of the robot's newest command, −1 before the first."""
         known = self.latest.get(robot)
         return -1 if known is None else known.tick
-
-    def why_refused(self, robot: str) -> str:
-        """What was wrong with the robot's latest command; "" if it counts, or there is none."""
-        return self._whys.get(robot, "")
 
     def take(self, key: str, payload: bytes, tick: int, oldest: int) -> str:
         """Take in a packet; the robot's name if its command is now newer.
@@ -110,7 +108,7 @@ class CommandBox:
         commands of one tick the first counts: the plant cannot know which of them is meant. That
         they differ is told.
         """
-        robot = self._robots.get(key)
+        robot = self.robots.get(key)
         if robot is None:
             return ""
         try:
@@ -126,18 +124,18 @@ class CommandBox:
         first = max(oldest, self.tick_of(robot) + 1)
         if not first <= command.tick <= tick:
             wanted = f"{first} … {tick}" if first < tick else f"{first}"
-            self._whys[robot] = f"command.tick: got {command.tick}, expected {wanted}"
+            self.refused[robot] = f"command.tick: got {command.tick}, expected {wanted}"
             return ""
         if excess := describe_excess(command, self._limits):
             return self._refuse_invalid(robot, excess)
         self.latest[robot] = command
-        self._whys.pop(robot, None)
+        self.refused.pop(robot, None)
         return robot
 
     def _refuse_invalid(self, robot: str, error: str) -> str:
         """Count a packet that no process of this project sends; no robot has a newer command."""
-        self._invalid[robot] += 1
-        self.errors[robot] = self._whys[robot] = error
+        self.invalid[robot] += 1
+        self.errors[robot] = self.refused[robot] = error
         return ""
 
 
@@ -208,7 +206,10 @@ def hold_joints(state: State) -> Command:
     return Command(state.tick, state.stamp_ns, zero, state.q_joint, zero, kp, kd)
 
 
-def damp_joints(tick: int) -> Command:
-    """The command of a tick that damps all joints, as motors without a command are damped."""
+def damp_joints(tick: int, damping: float = MOTOR_DAMPING) -> Command:
+    """The command of a tick that damps all joints, by default as motors without a command do.
+
+    `damping` is in N·m·s/rad.
+    """
     zero = np.zeros(N_JOINTS)
-    return Command(tick, tick * 1_000_000, zero, zero, zero, zero, np.full(N_JOINTS, MOTOR_DAMPING))
+    return Command(tick, tick * 1_000_000, zero, zero, zero, zero, np.full(N_JOINTS, damping))

@@ -14,33 +14,24 @@ from quadriga.shared.runtime.histogram import Histogram
 PERIOD_MS: Final = 1000
 MODE: Final = "realtime"
 DUE: Final = "due"  # ends the name of a counter, behind a robot's name: see `Deadlines.status`
-LATE_COUNT: Final = "late"
-LATE: Final = ""
+LATE: Final = "late"
 HELD: Final = "held"
-_BIN_MS: Final = 0.02
 
 
 class Deadlines:
-    """Counts from the first tick on.
-
-    Attributes:
-        late: number of ticks by robot and grade: `LATE` counts every tick without a command of
-            that tick, `HELD` those at which the motors held the joints. Of a robot that takes
-            commands every other tick, only those count.
-    """
+    """Counts from the first tick on."""
 
     def __init__(self, names: Iterable[str]) -> None:
-        self.late: Counter[tuple[str, str]] = Counter()
-        self._due: Counter[str] = Counter()
+        self._counts: Counter[str] = Counter()
         self._ages = {name: Histogram(1.0) for name in names}
-        self._jitter = Histogram(_BIN_MS)
+        self._jitter = Histogram(0.02)
         self._lateness_us: list[float] = []
 
-    def note_age(self, robot: str, age_ms: int) -> None:
-        """A tick has been taken with a robot's command of this age."""
+    def note_command(self, robot: str, age_ms: int, *, held: bool = False) -> None:
+        """A tick was taken with a command of this age, or with joints `held` in its place."""
         self._ages[robot].add(age_ms)
-        self._due[robot] += 1
-        self.late[robot, LATE] += age_ms > 0
+        self._counts.update({f"{robot}.{DUE}": 1, f"{robot}.{LATE}": age_ms > 0})
+        self._counts[f"{robot}.{HELD}"] += held
 
     def note_lateness(self, late_s: float) -> None:
         """The world went on this much later than its clock says."""
@@ -48,23 +39,23 @@ class Deadlines:
         self._lateness_us.append(1e6 * late_s)
 
     def describe_late(self) -> str:
-        """The counts of late ticks in words, "none" where no tick has been counted."""
-        counts = sorted(self.late.items())
-        return ", ".join(f"{' '.join(filter(None, key))} {n}" for key, n in counts) or "none"
+        """For each robot the numbers of ticks whose command was late, and of those held."""
+        return ", ".join(
+            f"{name} {self._counts[f'{name}.{LATE}']} held {self._counts[f'{name}.{HELD}']}"
+            for name in self._ages
+        )
 
     def status(self, tick: int, overruns: int) -> Status:
         """The report, as sent on `<team>/sim/status`.
 
         `ages_ms` holds median, p99 and max of `<robot>.command` and of the world's own `jitter`;
-        counters are `<robot>.due` (ticks at which it takes a command), `.late`, `.held`, `ticks`
-        and `overruns`; `tick_us` holds the lateness of each tick since the last status.
+        counters are `<robot>.due` (ticks at which it takes a command), `.late` (without the command
+        of that tick), `.held` (at which the motors held the joints), `ticks` and `overruns`;
+        `tick_us` holds the lateness of each tick since the last status.
         """
-        ages: dict[str, float] = self._jitter.quantiles("jitter")
+        ages = self._jitter.quantiles("jitter")
         for robot, histogram in self._ages.items():
             ages |= histogram.quantiles(f"{robot}.command")
-        counters = {"overruns": overruns, "ticks": tick}
-        counters |= {f"{robot}.{DUE}": count for robot, count in sorted(self._due.items())}
-        for (robot, grade), count in sorted(self.late.items()):
-            counters[f"{robot}.{grade or LATE_COUNT}"] = count
+        counters = {"overruns": overruns, "ticks": tick, **self._counts}
         lateness, self._lateness_us = np.array(self._lateness_us), []
         return Status(tick, tick * 1_000_000, MODE, "", "", ages, counters, np.zeros(0), lateness)

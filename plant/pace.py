@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import Final
 
 from quadriga.shared.bus.diagnostics import CLOCK_REMEDY, PACE_LIMIT, ClockOffset, lead
-from quadriga.shared.bus.discovery import ProcessInfo, ask, ask_clock, start_together
+from quadriga.shared.bus.discovery import ProcessInfo, ask, ask_clock
 from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError
@@ -62,20 +62,22 @@ class TeamPace:
             raise BusError(name, got, f"{1e3 * PACE_LIMIT:g} ms at most", cause)
 
     def start(self, pause: Callable[[], None], stopped: Callable[[], bool]) -> bool:
-        """Be ready with all others, and wait until T0; False if `stopped()` came first.
+        """Wait until T0, once all are ready; False if `stopped()` came first.
 
         Meanwhile `pause()` is called all the time.
 
         Raises:
-            BusError: some were not ready in time, two carry one name, or the plant that drives
-                time left before it said when the walk begins.
+            BusError: the plant that drives time left before it said when the walk begins.
         """
-        if not start_together(self._bus, self._config, stopped, pause):
-            return False
-        if self._lead:
-            start = self._hear_start(pause, stopped)
-        else:
+        start = 0
+        if not self._lead:
             start = self._me.start_ns = wall_ns() + _AHEAD_NS
+        while not start and not stopped():
+            if not has_lead(self._bus.members_at(HERE)):
+                name, cause = f"{self._lead} of team {self._bus.team!r}", "see what it says itself"
+                raise BusError(name, "gone", "it to say when the walk begins", cause)
+            for answer in ask(self._bus, (self._lead,), pause).get(self._lead, ()):
+                start = start or (answer.about.start_ns if answer.about is not None else 0)
         self._start = start - wall_offset_ns()
         while monotonic_ns() < self._start - _QUIET_NS:
             if stopped():
@@ -84,17 +86,6 @@ class TeamPace:
         sleep(1e-9 * (self._start - monotonic_ns()))
         self._begun = monotonic_ns()
         return not stopped()
-
-    def _hear_start(self, pause: Callable[[], None], stopped: Callable[[], bool]) -> int:
-        """T0, as the plant that drives time says; 0 if `stopped()` came first."""
-        while not stopped():
-            if not has_lead(self._bus.members_at(HERE)):
-                name, cause = f"{self._lead} of team {self._bus.team!r}", "see what it says itself"
-                raise BusError(name, "gone", "it to say when the walk begins", cause)
-            for answer in ask(self._bus, (self._lead,), pause).get(self._lead, ()):
-                if answer.about is not None and answer.about.start_ns:
-                    return answer.about.start_ns
-        return 0
 
     def wait(self) -> float:
         """Wait until the next tick begins; how late it does, s."""

@@ -10,9 +10,8 @@ from quadriga.plant.lockstep import run_lockstep
 from quadriga.plant.pace import TeamPace
 from quadriga.plant.protocol import TOLD_TO_STOP, End, Plant
 from quadriga.plant.realtime import run_realtime
-from quadriga.plant.requests import subscribe_estops, subscribe_requests
+from quadriga.plant.requests import subscribe_requests
 from quadriga.plant.server import PlantServer
-from quadriga.plant.team_time import team_time
 from quadriga.shared import codes
 from quadriga.shared.bus.discovery import ProcessInfo, await_agents, join, start_together
 from quadriga.shared.bus.liveness import Loss, loss_error
@@ -24,10 +23,8 @@ from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.runtime.scheduling import end_collection, leave_priority, take_priority
 from quadriga.shared.runtime.signals import interruptible, stop_on_signals
-from quadriga.shared.topics import COMMAND
 
 _ALL_STOP: Final = 1.0  # s, in which a team is stopped whose processes get the signal one by one
-_PAUSE: Final = 0.002  # s, between two looks of a simulated robot's plant that waits
 
 # What was expected, and what the cause may be, by the code of an end.
 _BAD_ENDS: Final = {
@@ -70,51 +67,44 @@ def run(
         KeyboardInterrupt: it is stopped before its plant is built.
     """
     stopped = stopped or stop_on_signals()
-    team, name, time = config.team.name, plant_name(robot), team_time(config, robot)
-    # A bridge opens sockets and starts its guard, which are not left half made.
+    team, realtime = config.team.name, config.world.mode == "realtime"
+    # A bridge opens sockets and starts its watchdog, which are not left half made.
     with nullcontext() if config.team.plant == BRIDGED else interruptible(stopped):
         plant = build(config, (robot,) if robot else robot_names(config.team.robots))
-    with Bus.open(config.bus, team, name, stopped) as bus:
-        for key in sorted({*time.keys, *(COMMAND.key(team, own) for own in plant.names)}):
-            bus.subscribe(key)
-        requests = subscribe_requests(bus)
-        if plant.is_robot:
-            plant.listen(subscribe_estops(bus))
+    with Bus.open(config.bus, team, plant_name(robot), stopped) as bus:
         with interruptible(stopped):
-            server = PlantServer(config, plant, bus, time, name)
-        server.requests = requests
-        me, realtime = ProcessInfo(bus, config), config.world.mode == "realtime"
+            server = PlantServer(config, plant, bus, robot)
+        for key in server.keys:
+            bus.subscribe(key)
+        server.requests = subscribe_requests(bus)
+        if plant.is_robot:
+            estops = subscribe_requests(bus)
+            plant.listen(lambda: estops().estop)
+        me = ProcessInfo(bus, config)
         if not join(bus, config, stopped, me):
             return
         pace = TeamPace(bus, config, me) if robot and realtime else None
         end_collection()
         take_priority(config.runtime.priority)
         try:
-            end = _walk(server, pace, stopped)
-            if time.drives:
+            if not _start(server, pace, stopped):
+                end = TOLD_TO_STOP
+            elif realtime:
+                end = run_realtime(server, stopped, pace)
+            else:
+                end = run_lockstep(server, stopped)
+            if end.code == codes.COMMAND_LOST and _is_stopped_soon(stopped):
+                end, server.time.end = TOLD_TO_STOP, None
+            if server.time.drives:
                 server.announce(end.code, "", end.detail)
         except Exception as error:
-            if time.drives:  # then the others need not find out by themselves
+            if server.time.drives:  # then the others need not find out by themselves
                 server.announce(codes.PLANT_FAILED, "", f"{type(error).__name__}: {error}")
             raise
         finally:
             plant.finish()
             leave_priority()
-    _check_end(time.end, team, plant.tick)
-
-
-def _walk(server: PlantServer, pace: TeamPace | None, stopped: Callable[[], bool]) -> End:
-    """Start the team and walk; why the walk is over."""
-    if not _start(server, pace, stopped):
-        return TOLD_TO_STOP
-    if server.config.world.mode == "realtime":
-        end = run_realtime(server, stopped, pace)
-    else:
-        end = run_lockstep(server, stopped)
-    if end.code == codes.COMMAND_LOST and _is_stopped_soon(stopped):
-        server.time.end = None
-        return TOLD_TO_STOP
-    return end
+    _check_end(server.time.end, team, plant.tick)
 
 
 def _is_stopped_soon(stopped: Callable[[], bool]) -> bool:
@@ -134,14 +124,14 @@ def _start(server: PlantServer, pace: TeamPace | None, stopped: Callable[[], boo
         return False
     if not plant.prepare(stopped):
         return False
-    pause = plant.idle if plant.is_robot else None
-    if pace is None:
-        return start_together(bus, config, stopped, pause)
-    return pace.start(pause or _pause, stopped)
+    wait = plant.idle if plant.is_robot else _pause
+    if not start_together(bus, config, stopped, wait):
+        return False
+    return pace is None or pace.start(wait, stopped)
 
 
 def _pause() -> None:
-    sleep(_PAUSE)
+    sleep(0.002)
 
 
 def _check_end(end: End | None, team: str, tick: int) -> None:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Final
 
 from quadriga.plant.commands import CommandTimeout
-from quadriga.plant.deadlines import HELD, PERIOD_MS, Deadlines
+from quadriga.plant.deadlines import PERIOD_MS, Deadlines
 from quadriga.plant.pace import TeamPace
 from quadriga.plant.protocol import TOLD_TO_STOP, End
 from quadriga.plant.server import PlantServer
-from quadriga.plant.team_time import plant_gone
 from quadriga.shared.bus.session import HERE
 from quadriga.shared.messages import Command
 from quadriga.shared.runtime.clock import Rate
@@ -30,64 +29,53 @@ def run_realtime(
         stopped: asked with every tick whether to stop.
         pace: of one of several plants; None: of the plant of all robots.
     """
+    config, names = server.config, server.plant.names
     # A world that fell behind slows down: in ticks made up for at once nobody could answer.
-    rate, motors = pace or Rate(TICK, slack=_SLACK), _Motors(server)
+    rate, deadlines = pace or Rate(TICK, slack=_SLACK), Deadlines(names)
+    timeouts = {name: CommandTimeout(config.world, config.gait.stand_ms) for name in names}
     end: End | None = None
     while end is None and not stopped():
         server.publish()
-        motors.deadlines.note_lateness(rate.wait())  # meanwhile the agents answer
+        deadlines.note_lateness(rate.wait())  # meanwhile the agents answer
         for packet in server.bus.drain():
             server.take(*packet, oldest=0)
         if server.plant.tick % SAMPLE_MS == 0:
-            _check_others(server, pace)
-        end = server.step(motors.commands())
+            _check_others(server)
+        end = server.step(_choose_commands(server, timeouts, deadlines))
         if server.plant.tick % PERIOD_MS == 0 or end is not None:
-            status = motors.deadlines.status(server.plant.tick, rate.overruns)
-            server.publish_status(server.plant.describe(status))
+            server.publish_status(deadlines.status(server.plant.tick, rate.overruns))
     code, detail = end or TOLD_TO_STOP
-    late = motors.deadlines.describe_late()
+    late = deadlines.describe_late()
     return End(code, f"{detail}; late ticks: {late}; overruns of the world: {rate.overruns}")
 
 
-def _check_others(server: PlantServer, pace: TeamPace | None) -> None:
+def _check_others(server: PlantServer) -> None:
     """See whether the agents, the other plants and the link to the router are still there."""
     server.check_link()
     present = server.bus.members_at(HERE)
     if not server.plant.is_robot:  # a bridge sees to its robot itself
         server.end_without(set(server.plant.names) - present, "gone")
-    if pace is None or server.time.end is not None:
-        return
-    server.time.look(present)
-    timeout = server.config.bus.clock_timeout
-    if behind := server.time.behind(server.plant.tick - round(1000 * timeout)):
-        server.time.end = plant_gone(
-            sorted(behind), f"silent for {timeout:g} s{server.bus.standstill.note}"
-        )
+    server.time.look(present, server.plant.tick, server.bus.standstill.note)
 
 
-class _Motors:
-    """The command each motor follows now; `deadlines` counts how late they were."""
+def _choose_commands(
+    server: PlantServer, timeouts: Mapping[str, CommandTimeout], deadlines: Deadlines
+) -> dict[str, Command]:
+    """What each robot's motors follow; ends the walk, and damps, where commands are lost.
 
-    def __init__(self, server: PlantServer) -> None:
-        self._server, config = server, server.config
-        names = server.plant.names
-        self._timeouts = {n: CommandTimeout(config.world, config.gait.stand_ms) for n in names}
-        self.deadlines = Deadlines(names)
-
-    def commands(self) -> dict[str, Command]:
-        """By robot; of a robot behind a bridge its newest, however late. Ends the walk if lost."""
-        server, tick = self._server, self._server.plant.tick
-        chosen: dict[str, Command] = {}
-        for name, timeout in self._timeouts.items():
-            command = server.commands.latest.get(name)
-            if tick % server.plant.period_ms == 0:
-                self.deadlines.note_age(name, tick - server.commands.tick_of(name))
-            if server.plant.is_robot:
-                chosen |= {} if command is None else {name: command}
-                continue
-            chosen[name] = timeout.choose(command, tick, server.plant.states, name)
-            self.deadlines.late[name, HELD] += timeout.held is not None
-            if why := timeout.describe_loss(command, tick):
-                del chosen[name]  # damped
+    A robot behind a bridge gets its newest command, however late: the bridge sees to that.
+    """
+    plant, chosen = server.plant, dict[str, Command]()
+    for name, timeout in timeouts.items():
+        command = server.commands.latest.get(name)
+        if plant.is_robot:
+            chosen |= {} if command is None else {name: command}
+        else:
+            chosen[name] = timeout.choose(command, plant.tick, plant.states, name)
+            if why := timeout.describe_loss(command, plant.tick):
+                del chosen[name]
                 server.end_without({name}, why)
-        return chosen
+        if plant.tick % plant.period_ms == 0:
+            age = plant.tick - server.commands.tick_of(name)
+            deadlines.note_command(name, age, held=timeout.held is not None)
+    return chosen

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from contextlib import suppress
+from collections.abc import Callable
 from typing import Final, NamedTuple
 
-from quadriga.shared.bus.session import Arrival, Bus
+from quadriga.shared.bus.session import Bus
 from quadriga.shared.codec import decode
 from quadriga.shared.errors import MessageError
-from quadriga.shared.messages import EStop, LiveFault, Message, Reset, SafeStop
+from quadriga.shared.messages import EStop, LiveFault, Reset, SafeStop
 from quadriga.shared.topics import ESTOP, LIVE_FAULT, RESET, STOP
 
-_UNREADABLE: Final = "unreadable"
-_KINDS: Final = {ESTOP: EStop, RESET: Reset, STOP: SafeStop, LIVE_FAULT: LiveFault}
+_UNREADABLE: Final = EStop(0, 0, "unreadable")  # somebody wanted to stop the team
 
 
 class Requests(NamedTuple):
@@ -40,42 +38,26 @@ def subscribe_requests(bus: Bus) -> Callable[[], Requests]:
 
     It is called at every tick and nearly always finds nothing, so it looks in one place.
     """
-    kinds = {topic.key(bus.team): kind for topic, kind in _KINDS.items()}
-    take = bus.collect(*kinds)
+    topics = {topic.key(bus.team): topic for topic in (ESTOP, RESET, STOP, LIVE_FAULT)}
+    take = bus.collect(*topics)
 
     def receive() -> Requests:
-        arrived = take()
-        return _sort(kinds, arrived) if arrived else NO_REQUESTS
+        asked = NO_REQUESTS
+        for _, key, payload in take():
+            try:
+                message = decode(payload, topics[key].type)
+            except MessageError:
+                if topics[key] is not ESTOP:
+                    continue
+                message = _UNREADABLE
+            if isinstance(message, EStop):
+                asked = asked._replace(estop=asked.estop or message.reason or ESTOP.name)
+            elif isinstance(message, Reset):
+                asked = asked._replace(reset=message)
+            elif isinstance(message, SafeStop):
+                asked = asked._replace(stop=message)
+            elif isinstance(message, LiveFault):
+                asked = asked._replace(faults=(*asked.faults, message.fault))
+        return asked
 
     return receive
-
-
-def subscribe_estops(bus: Bus) -> Callable[[], str]:
-    """A function that tells why the emergency stop was pressed; "" until it is."""
-    take = bus.collect(ESTOP.key(bus.team))
-    return lambda: next((_reason_of(payload) for _, _, payload in take()), "")
-
-
-def _sort(kinds: Mapping[str, type[Message]], arrived: Iterable[Arrival]) -> Requests:
-    requests = NO_REQUESTS
-    for _, key, payload in arrived:
-        if kinds[key] is EStop:
-            requests = requests._replace(estop=requests.estop or _reason_of(payload))
-            continue
-        with suppress(MessageError):
-            message = decode(payload, kinds[key])
-            if isinstance(message, Reset):
-                requests = requests._replace(reset=message)
-            elif isinstance(message, SafeStop):
-                requests = requests._replace(stop=message)
-            elif isinstance(message, LiveFault):
-                requests = requests._replace(faults=(*requests.faults, message.fault))
-    return requests
-
-
-def _reason_of(payload: bytes) -> str:
-    """Why an emergency stop was pressed, never ""."""
-    try:
-        return decode(payload, EStop).reason or ESTOP.name
-    except MessageError:
-        return _UNREADABLE  # somebody wanted to stop the team

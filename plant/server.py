@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections import Counter
 from collections.abc import Callable, Collection, Mapping
 from typing import Final
 
@@ -17,7 +18,7 @@ from quadriga.shared.codec import encode, truncate_text
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.members import SIM
+from quadriga.shared.members import plant_name
 from quadriga.shared.messages import Clock, Command, Event, Reset, SafeStop, Status, format_event
 from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.topics import CLOCK, EVENT, POSTURE, STATE, STATUS, TRUTH
@@ -35,22 +36,22 @@ class PlantServer:
         config: the team's configuration.
         plant: its robots, or one of them.
         bus: where the agents are.
-        time: this plant's part in the team's time; by default it is the plant of all robots.
-        name: of this process.
+        robot: the robot that it is the plant of; "": of all.
 
     Attributes:
+        time: this plant's part in the team's time.
         requests: gives what people have asked for since it was called last. A bridge sees to an
             emergency stop itself.
         commands: the newest command of every robot of the plant.
+        keys: what to subscribe to.
     """
 
-    def __init__(
-        self, config: Config, plant: Plant, bus: Bus, time: TeamTime | None = None, name: str = SIM
-    ) -> None:
+    def __init__(self, config: Config, plant: Plant, bus: Bus, robot: str = "") -> None:
         team, realtime = config.team.name, config.world.mode == "realtime"
         self.config, self.plant, self.bus = config, plant, bus
-        self.time = time or TeamTime()
+        self.time = TeamTime(config, robot)
         self.commands = CommandBox(team, plant.names, config.robot)
+        self.keys = tuple(sorted({*self.time.keys, *self.commands.robots}))
         self.requests: Callable[[], Requests] = lambda: NO_REQUESTS
         self._estopped = -1  # tick of the last answer to the emergency stop in force; −1: none is
         self._stop = ""  # why somebody has asked the team to stop, and the walk to end
@@ -65,14 +66,14 @@ class PlantServer:
         }
         self._put_truth = bus.publisher(TRUTH.key(team), droppable=realtime)
         self._put_clock = bus.publisher(CLOCK.key(team), droppable=realtime)
-        self._put_status = bus.publisher(STATUS.key(team, name), droppable=True)
+        self._put_status = bus.publisher(STATUS.key(team, plant_name(robot)), droppable=True)
         # The last one has all leave: in lock-step it comes after all else. In real time events wait
         # for nobody, and are not what gets lost when somebody is slow.
         self._put_event = bus.publisher(EVENT.key(team), urgent=realtime)
         self._periods = periods(config)
         self._last_tick = round(config.world.duration * 1000)
         self._fallen: set[str] = set()
-        self._invalid: dict[str, int] = {}  # by robot, as last announced
+        self._invalid = Counter[str]()  # by robot, as last announced
         self._published = -1  # newest tick whose states are out
         self._realtime = realtime
 
@@ -81,24 +82,26 @@ class PlantServer:
 
         The truth is the whole team's: a plant of one robot among several does not know it.
         """
-        plant = self.plant
-        self._take_early()
+        plant, tick = self.plant, self.plant.tick
+        # What has come before the states of this tick are out: no command of this tick can be among
+        # it. Taken in later, a forged one would come before the robot's own.
+        for packet in self.bus.drain():
+            self.take(*packet, 0 if self._realtime else tick)
         # States come first: agents wait for them, and in real time they have a millisecond.
-        seen: list[tuple[str, bytes]] = []
+        states = dict[str, bytes]()
         for name, state in plant.states().items():
-            payload = encode(state)
-            self._put_state[name](payload)
-            seen.append((name, payload))
-        if self.time.drives and plant.tick % self._periods[CLOCK.name] == 0:
-            self._put_clock(encode(Clock(plant.tick, plant.tick * 1_000_000)))
-        if self.time.alone and plant.tick % self._periods[TRUTH.name] == 0:
+            states[name] = encode(state)
+            self._put_state[name](states[name])
+        if self.time.drives and tick % self._periods[CLOCK.name] == 0:
+            self._put_clock(encode(Clock(tick, tick * 1_000_000)))
+        if self.time.alone and tick % self._periods[TRUTH.name] == 0:
             truth = plant.truth()
             if truth is not None:
                 self._put_truth(encode(truth))
-        if plant.tick % POSTURE.period_ms == 0:
-            for name, payload in seen:
+        if tick % POSTURE.period_ms == 0:
+            for name, payload in states.items():
                 self._put_posture[name](payload)
-        self._published = plant.tick
+        self._published = tick
         plant.settle()
 
     def take(self, key: str, payload: bytes, oldest: int) -> str:
@@ -111,16 +114,6 @@ class PlantServer:
         self.time.take(key, payload, self.plant.tick)
         return ""
 
-    def _take_early(self) -> None:
-        """Take in what has come before the states of this tick are out.
-
-        No command of this tick can be among it. Taken in later, a forged one would come before the
-        robot's own.
-        """
-        oldest = 0 if self._realtime else self.plant.tick
-        for packet in self.bus.drain():
-            self.take(*packet, oldest)
-
     def check_link(self) -> None:
         """End this plant's walk if its link to the router is gone: nobody hears it any more."""
         loss = find_lost_link(self.bus, self.config)
@@ -128,29 +121,26 @@ class PlantServer:
             self.time.end = End(*loss)
 
     def end_without(self, robots: Collection[str], why: str) -> None:
-        """End the walk because commands of some robots do not come any more, if there are any."""
-        if not robots:
-            return
-        for refused in filter(None, map(self.commands.why_refused, sorted(robots))):
-            why += f", its last command was refused ({refused})"
-        detail = f"{', '.join(sorted(robots))} {why}{self.bus.standstill.note}"
-        self.end(End(codes.COMMAND_LOST, detail))
+        """End the walk because commands of some robots do not come any more, if there are any.
 
-    def end(self, end: End) -> None:
-        """End the walk; of other plants the one that drives time hears it, and announces it."""
-        if self.time.end is not None:
+        Of other plants the one that drives time hears it, and announces it.
+        """
+        if not robots or self.time.end is not None:
             return
-        self.time.end = end
+        refused = [self.commands.refused[r] for r in sorted(robots) if r in self.commands.refused]
+        why += "".join(f", its last command was refused ({each})" for each in refused)
+        detail = f"{', '.join(sorted(robots))} {why}{self.bus.standstill.note}"
+        self.time.end = End(codes.COMMAND_LOST, detail)
         if not self.time.drives:
-            self.announce(end.code, self.plant.names[0], end.detail)
+            self.announce(codes.COMMAND_LOST, self.plant.names[0], detail)
 
     def announce(self, code: str, robot: str, detail: str) -> None:
         """Publish an event of the present tick; a detail longer than a message's text is cut."""
         self._send(Event.of(self.plant.tick, code, robot, truncate_text(detail)))
 
     def publish_status(self, status: Status) -> None:
-        """Publish the plant's report on itself."""
-        self._put_status(encode(status))
+        """Publish the plant's report on itself, with what its robots have to say."""
+        self._put_status(encode(self.plant.describe(status)))
 
     def step(self, commands: Mapping[str, Command]) -> End | None:
         """Advance the plant by one tick; why the walk ends, if it does."""
@@ -158,8 +148,6 @@ class PlantServer:
         requests = self.requests()
         if requests is not NO_REQUESTS:
             self._obey(requests)
-            for fault in requests.faults:
-                self._inject(fault)
         if self._estopped >= 0:
             commands = {name: damp_joints(self.plant.tick) for name in self.plant.names}
         for event in self.plant.step(commands):
@@ -183,6 +171,8 @@ class PlantServer:
     def _obey(self, requests: Requests) -> None:
         """Do what people have asked for; an emergency stop outranks its release."""
         plant, tick = self.plant, self.plant.tick
+        for fault in requests.faults:
+            self._inject(fault)
         robot = "" if self.time.alone else plant.names[0]
         stop = requests.stop
         if stop is not None and stop != self._last_stop and self.time.drives:
@@ -208,10 +198,9 @@ class PlantServer:
 
     def _inject(self, fault: str) -> None:
         """Make a sensor or motor of one of the plant's robots faulty, or say why not."""
-        robot = fault.partition("/")[0]
-        if robot not in self.plant.names and not self.time.drives:
-            return  # whoever drives time answers for robots that there are not
-        if robot in robot_names(self.config.team.robots) and robot not in self.plant.names:
+        robot, team = fault.partition("/")[0], robot_names(self.config.team.robots)
+        # Whoever drives time answers for robots that there are not.
+        if robot not in self.plant.names and (robot in team or not self.time.drives):
             return
         try:
             events = self.plant.inject(fault)
@@ -234,9 +223,8 @@ class PlantServer:
         """Announce invalid commands, once in a second of world time at most unless `at_once`."""
         if not at_once and self.plant.tick % 1000:
             return
-        for robot in self.plant.names:
-            count = self.commands.invalid_of(robot)
-            if count != self._invalid.get(robot, 0):
+        for robot, count in self.commands.invalid.items():
+            if count != self._invalid[robot]:
                 self._invalid[robot] = count
                 detail = f"{count} commands dropped: {self.commands.errors[robot]}"
                 self.announce(codes.MALFORMED, robot, detail)

@@ -194,7 +194,7 @@ class Consumed(Message):
 
     In real time that is every step that took in more than the state after the last one, in
     lock-step only one at which something was owed, late or passed over (see
-    `agents.inbox.intake_log`). Messages are referred to as `topic:sender:serial`; the serial is
+    `agents.inbox`). Messages are referred to as `topic:sender:serial`; the serial is
     the tick, of a plan its step and exchange: `measurement:r1:480`, `plan:r1:12.0`.
     """
 

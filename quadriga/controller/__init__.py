@@ -10,9 +10,8 @@
 See docs/tutorials/own_controller.md, also for programs in other languages.
 """
 
-from quadriga.controller.motor_command import build_command
-from quadriga.controller.serve import serve
-from quadriga.controller.task import ControllerTask, read_task
+from quadriga.controller.serve import ControllerTask, read_task, serve
+from quadriga.controller.stepped import build_command
 from quadriga.shared.messages import Command, Reference, State
 
 __all__ = ["Command", "ControllerTask", "Reference", "State", "build_command", "read_task", "serve"]

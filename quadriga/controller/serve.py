@@ -2,24 +2,62 @@
 
 from __future__ import annotations
 
+import os
 import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from quadriga.agents.inbox.inbox import Inbox
+from quadriga.agents.inbox import Inbox
 from quadriga.agents.shell import answer_states
-from quadriga.controller.motor_command import build_command
-from quadriga.controller.stepped import Step, SteppedController
-from quadriga.controller.task import ControllerTask, read_task
+from quadriga.controller.stepped import Step, SteppedController, build_command
+from quadriga.shared.agent_command import ENVIRONMENT
 from quadriga.shared.codec import decode, encode
-from quadriga.shared.errors import QuadrigaError
+from quadriga.shared.config.load import load
+from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import ConfigError, QuadrigaError
 from quadriga.shared.messages import State
 from quadriga.shared.printable import printable_line
+from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.runtime.signals import stop_on_signals
 
-_FAILED: Final = 1
-_INTERRUPTED: Final = 130
+_ROBOT: Final = f"{ENVIRONMENT}ROBOT"
+_CONFIG: Final = f"{ENVIRONMENT}CONFIG"
+_CAUSE: Final = "`quadriga walk --controller`, or `quadriga agent --robot NAME`, starts it so"
+
+
+@dataclass(frozen=True, slots=True)
+class ControllerTask:
+    """What a controller of one's own is for.
+
+    Attributes:
+        robot: the robot's name, r1 … rn.
+        config: the team's configuration; `config.robot` is the kind of robot.
+    """
+
+    robot: str
+    config: Config
+
+
+def read_task(environment: Mapping[str, str] = os.environ) -> ControllerTask:
+    """The task that the environment tells, as `quadriga` starts a controller.
+
+    Raises:
+        ConfigError: it tells none, or the configuration cannot be read.
+    """
+    for name in (_ROBOT, _CONFIG):
+        if not environment.get(name):
+            raise ConfigError(
+                name, "nothing in the environment", "a robot's name and a file", _CAUSE
+            )
+    robot, config = environment[_ROBOT], load(Path(environment[_CONFIG]))
+    names = robot_names(config.team.robots)
+    if robot not in names:
+        raise ConfigError(_ROBOT, repr(robot), f"one of {', '.join(names)}")
+    return ControllerTask(robot, config)
 
 
 def serve(step: Step, task: ControllerTask | None = None) -> None:
@@ -49,9 +87,9 @@ def serve(step: Step, task: ControllerTask | None = None) -> None:
         answer_states(robot.config, agent, inbox, stopped, _load_codec)
     except QuadrigaError as error:
         print(printable_line(f"quadriga: {error}"), file=sys.stderr, flush=True)
-        raise SystemExit(_FAILED) from None
+        raise SystemExit(1) from None
     except KeyboardInterrupt:
-        raise SystemExit(_INTERRUPTED) from None
+        raise SystemExit(130) from None
 
 
 def _load_codec() -> None:

@@ -6,27 +6,24 @@ What it remembers between ticks is its own, so that nobody but itself can comput
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import field, replace
+from dataclasses import field
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from quadriga.agents.modes import ResumeState, ramp
+from quadriga.agents.modes import ResumeState, ramp, requested_stops, slowed
 from quadriga.agents.planning.interface import NOTHING, Expected
 from quadriga.agents.planning.references import reference_at, remember_references
 from quadriga.agents.step_io import Inputs, Outputs
-from quadriga.controller.motor_command import CAUSE
 from quadriga.plant.commands import damp_joints
-from quadriga.shared.codes import with_detail
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.messages import Command, Reference, State
 from quadriga.shared.modes import (
-    ESTOP,
     REFERENCE_LOST,
     RESET,
     STAND,
-    STOPPED,
     STOPPING,
     WALK,
     Mode,
@@ -34,13 +31,48 @@ from quadriga.shared.modes import (
     next_mode,
     resolve_stops,
 )
+from quadriga.shared.robots.conventions import N_JOINTS
 from quadriga.shared.runtime.record import record
 from quadriga.shared.topics import REFERENCE, REFERENCE_EPOCH_MS
 
 Step = Callable[[State, Reference], Command]
 """From what the robot measures and what is asked of it to its motor command."""
 
-_NO_COUNTS: Final[dict[str, int]] = {}
+_CAUSE: Final = "see docs/messages.md#command"
+
+
+def build_command(
+    state: State,
+    *,
+    tau: ArrayLike = 0.0,
+    q_des: ArrayLike = 0.0,
+    v_des: ArrayLike = 0.0,
+    kp: ArrayLike = 0.0,
+    kd: ArrayLike = 0.0,
+) -> Command:
+    """The command that answers a state; motors apply `tau + kp (q_des − q) + kd (v_des − v)`.
+
+    Each field is an array (12,) in the order of the joints, or one number for all of them.
+
+    Args:
+        state: what it answers.
+        tau: torque, N·m.
+        q_des: angle, rad.
+        v_des: rate, rad/s.
+        kp: stiffness, N·m/rad.
+        kd: damping, N·m·s/rad.
+
+    Raises:
+        ProcessError: a field has another shape.
+    """
+    fields = {"tau": tau, "q_des": q_des, "v_des": v_des, "kp": kp, "kd": kd}
+    row = np.empty(len(fields) * N_JOINTS)
+    for name, value in fields.items():
+        shape = np.shape(value)
+        if shape not in ((), (N_JOINTS,)):
+            raise ProcessError(f"command.{name}", f"shape {shape}", "() or (12,)", _CAUSE)
+        row[Command.CUTS[name]] = value
+    return Command.from_row(state.tick, state.stamp_ns, row)
 
 
 @record
@@ -91,25 +123,21 @@ class SteppedController:
             command = damp_joints(tick)
         else:
             followed, _ = reference_at(ramp(references, resume, tick), tick, self._height)
-            answer = self._step(inputs.state, _slowed(followed, mode, tick))
+            answer = self._step(inputs.state, slowed(followed, mode.speed_factor(tick)))
             command = self._check(answer, tick)
         ages = {REFERENCE.name: float(age)}
-        outputs = Outputs(command, None, None, mode.name, mode.reason, _NO_COUNTS, ages, None)
+        outputs = Outputs(command, None, None, mode.name, mode.reason, {}, ages, None)
         return ControllerMemory(tick, mode, references, resume), outputs
 
     def _course(self, mode: Mode, inputs: Inputs, *, led: bool) -> Mode:
         """The mode at this tick: what people have said, and whether an operator is there."""
-        tick, stops = inputs.state.tick, list[Stop]()
+        tick, stops = inputs.state.tick, requested_stops(inputs)
         if mode.passive and inputs.reset is not None and inputs.estop is None:
             mode = Mode(STAND, tick, RESET)
         elif mode.may_resume and mode.name == STAND and inputs.resume is not None:
             mode = Mode(WALK, tick)
         else:
             mode = next_mode(mode, tick, self._stand_ms, stance_ends=True)
-        if inputs.estop is not None:
-            stops.append(Stop(ESTOP, with_detail(ESTOP, inputs.estop.reason)))
-        if inputs.stop is not None:
-            stops.append(Stop(STOPPING, with_detail(STOPPED, inputs.stop.reason)))
         if mode.name == WALK and not led:
             stops.append(Stop(STOPPING, REFERENCE_LOST))
         return resolve_stops(mode, tick, stops)
@@ -129,15 +157,6 @@ class SteppedController:
         if not np.isfinite(answer.row).all():
             wrong = [n for n, cut in Command.CUTS.items() if not np.isfinite(answer.row[cut]).all()]
             raise ProcessError(
-                f"{name}: command.{wrong[0]}", "NaN or infinity", "finite numbers", CAUSE
+                f"{name}: command.{wrong[0]}", "NaN or infinity", "finite numbers", _CAUSE
             )
         return answer
-
-
-def _slowed(reference: Reference, mode: Mode, tick: int) -> Reference:
-    """What is asked of a robot in this mode: the share of the speed that is still followed."""
-    share = mode.speed_factor(tick)
-    if share == 1.0:
-        return reference
-    vx, vy, wz = share * reference.vx, share * reference.vy, share * reference.wz
-    return replace(reference, vx=vx, vy=vy, wz=wz)

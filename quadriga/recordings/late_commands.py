@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from quadriga.plant.deadlines import DUE, LATE_COUNT
+from quadriga.plant.deadlines import DUE, LATE
 
 # A share that a machine which keeps up stays under for every second: a command that is late once
 # in a while is used one tick later, and nobody notices.
@@ -24,7 +24,7 @@ def late_shares(before: Mapping[str, int], now: Mapping[str, int]) -> dict[str, 
         robot, _, what = name.rpartition(".")
         due = count - before.get(name, 0)
         if what == DUE and robot and due > 0:
-            late = f"{robot}.{LATE_COUNT}"
+            late = f"{robot}.{LATE}"
             shares[robot] = (now.get(late, 0) - before.get(late, 0)) / due
     return shares
 

@@ -8,8 +8,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from quadriga.agents.agent import Agent
-from quadriga.agents.inbox.inbox import Inbox, Order, Source, decode_packet, order_of
-from quadriga.agents.inbox.intake_log import ANYONE
+from quadriga.agents.inbox import Inbox, Order, Source, decode_packet, order_of
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import RecordingError
 from quadriga.shared.messages import Consumed
@@ -22,7 +21,6 @@ from quadriga.shared.topics import (
     INPUTS,
     MEASUREMENT,
     PLAN,
-    REQUESTS,
     SAMPLE_MS,
     STATE,
     Topic,
@@ -117,8 +115,7 @@ def _build_handlers(
     handlers: dict[str, Callable[[ChunkEntry], None]] = {}
     for key, (topic, sender) in inbox.topics.items():
         if topic not in (STATE, EVENT):
-            sent_by = ANYONE if topic in REQUESTS else sender
-            handlers[key] = _keep_received(log, topic, sent_by)
+            handlers[key] = _keep_received(log, topic, sender)
     handlers[STATE.key(team, robot)] = _keep_states(log)
     handlers[COMMAND.key(team, robot)] = keep_command
     handlers[INPUTS.key(team, robot)] = keep_record

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from quadriga.agents.agent import Agent
-from quadriga.agents.inbox.inbox import Inbox
+from quadriga.agents.inbox import Inbox
 from quadriga.identification.central_planner import collected_of
 from quadriga.replay.agent_log import read_agent_log
 from quadriga.replay.breakpoint import Breakpoint

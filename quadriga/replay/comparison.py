@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 
 from quadriga.agents.agent import AgentState, Inputs, Outputs
-from quadriga.agents.inbox.inbox import order_of
+from quadriga.agents.inbox import order_of
 from quadriga.replay.agent_log import AgentLog, Serial
 from quadriga.replay.difference import Difference, find_difference
 from quadriga.shared.codec import decode, encode

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from quadriga.agents.inbox.intake_log import list_messages
+from quadriga.agents.inbox import list_messages
 from quadriga.replay.comparison import COMPARED, ReplayedStep, ReplayVerdict
 
 _STATEFUL: Final = (

@@ -8,8 +8,15 @@ from dataclasses import dataclass
 from typing import Final
 
 from quadriga.agents.agent import Agent, Inputs
-from quadriga.agents.inbox.inbox import Due, Inbox, Order, Source
-from quadriga.agents.inbox.intake_log import format_message_id, has_rule, parse_message_id
+from quadriga.agents.inbox import (
+    Due,
+    Inbox,
+    Order,
+    Source,
+    format_message_id,
+    has_rule,
+    parse_message_id,
+)
 from quadriga.agents.planning.interface import NOTHING
 from quadriga.replay.agent_log import AgentLog, Packet
 from quadriga.shared.config.sections import Config

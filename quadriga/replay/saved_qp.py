@@ -21,7 +21,8 @@ from typing import Any, Final
 import daqp
 import numpy as np
 
-from quadriga.agents.agent import Agent, AgentState, Inputs, StepProblems
+from quadriga.agents.agent import Agent, AgentState, Inputs
+from quadriga.agents.controller.whole_body_qp import WholeBodySolution
 from quadriga.agents.planner.solver import SolvedQp
 from quadriga.shared.errors import RecordingError, name_file_errors
 from quadriga.shared.robots.conventions import N_JOINTS, Array
@@ -102,17 +103,17 @@ def problems_of(agent: Agent, before: AgentState, inputs: Inputs, about: str) ->
         inputs: what it took in.
         about: which step this is, in words.
     """
-    if agent.stands_up(before, inputs):
+    posed = agent.problems_of(before, inputs)
+    if posed is None:
         return {}
-    problems = agent.problems_of(before, inputs)
-    saved = {WHOLE_BODY: _save_whole_body(problems, about)}
-    if problems.planner is not None:
-        saved[PLANNER] = _save_planner(problems.planner, about)
+    whole_body, planner = posed
+    saved = {WHOLE_BODY: _save_whole_body(whole_body, about)}
+    if planner is not None:
+        saved[PLANNER] = _save_planner(planner, about)
     return saved
 
 
-def _save_whole_body(problems: StepProblems, about: str) -> SavedQp:
-    qp = problems.whole_body
+def _save_whole_body(qp: WholeBodySolution, about: str) -> SavedQp:
     cones = 5 * qp.feet  # the other rows do not exist without more feet in contact
     rows = N_JOINTS + cones
     return SavedQp(

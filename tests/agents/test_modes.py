@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from quadriga.agents.agent import Inputs, Outputs
+from quadriga.agents.agent import Inputs
 from quadriga.agents.modes import (
     GRACE_MS,
     RAMP_MS,
@@ -60,19 +59,13 @@ def test_after_a_stop_or_a_reset_it_resumes_only_when_asked_to(reason: str) -> N
     mode = Mode(STAND, 1700, f"{reason}:ann")
     assert not begins(AUTO, mode, 2000)
     assert begins(AUTO, mode, 2000, requested=BEGIN - 100)
-
-
-@pytest.mark.parametrize(
-    "mode",
-    [
+    for never in (
         Mode(PASSIVE, 5, "fall"),
         Mode(ESTOP, 5, "estop:reference-lost"),
         Mode(STAND, 5, "balance-lost"),
         Mode(STOPPING, BEGIN - 5, "reference-lost"),
-    ],
-)
-def test_from_nothing_else_it_resumes(mode: Mode) -> None:
-    assert not begins(AUTO, mode, 10, requested=BEGIN - 10)
+    ):
+        assert not begins(AUTO, never, 10, requested=BEGIN - 10)
 
 
 def test_references_rise_from_nothing_within_a_second() -> None:
@@ -144,9 +137,9 @@ def test_it_resumes_so_long_after_its_inputs_are_back(seconds: float, begins: in
 
 def test_inputs_that_fail_again_within_that_time_keep_it_standing() -> None:
     robot = stood(AUTO)
-    robot.run(2401)
-    robot.references = False
-    robot.run(3000)
+    for until, references in ((2401, True), (3000, False)):
+        robot.references = references
+        robot.run(until)
     robot.references = True
     assert modes(robot, 4200) == {STAND: 3000, WALK: 4100}
 
@@ -209,29 +202,29 @@ def lost_of(since: int = SINCE, **statuses: Status) -> list[str]:
     return [stop.reason for stop in stops]
 
 
+STANDS, DAMPED = status(NOW, STAND, "peer-lost:r3"), status(NOW, PASSIVE, "fall")
+
+
 @pytest.mark.parametrize(
-    ("said", "lost"),
+    ("said", "since", "lost"),
     [
-        (status(NOW - SILENCE_MS, WALK), False),
-        (status(NOW - SILENCE_MS - 1, WALK), True),
-        (status(NOW - 90, STAND, "reference-lost"), True),
-        (status(NOW - 90, STOPPING, "peer-lost:r3"), True),
-        (status(NOW - 90, STAND), False),  # all stand before they walk
-        (status(NOW - 90, PASSIVE, "fall"), True),
-        (status(NOW - 90, ESTOP, "estop:dog"), True),
-        (status(NOW - 90, "standing-up", "reset:ann"), True),
+        (status(NOW - SILENCE_MS, WALK), SINCE, False),
+        (status(NOW - SILENCE_MS - 1, WALK), SINCE, True),
+        (status(NOW - 90, STAND, "reference-lost"), SINCE, True),
+        (status(NOW - 90, STOPPING, "peer-lost:r3"), SINCE, True),
+        (status(NOW - 90, STAND), SINCE, False),  # all stand before they walk
+        (status(NOW - 90, PASSIVE, "fall"), SINCE, True),
+        (status(NOW - 90, ESTOP, "estop:dog"), SINCE, True),
+        (status(NOW - 90, "standing-up", "reset:ann"), SINCE, True),
+        (STANDS, NOW - GRACE_MS, False),  # robots that walk again need not begin at once
+        (STANDS, NOW - GRACE_MS - 1, True),
+        (DAMPED, NOW - 1, True),
     ],
 )
-def test_whose_status_stops_the_others(said: Status, lost: bool) -> None:
-    assert lost_of(r2=said, r3=status(NOW, WALK)) == (["peer-lost:r2"] if lost else [])
-    assert lost_of(r3=status(NOW, WALK)) == [], "who has not spoken is not missed"
-
-
-def test_robots_that_walk_again_need_not_begin_at_once() -> None:
-    stands, damped = status(NOW, STAND, "peer-lost:r3"), status(NOW, PASSIVE, "fall")
-    assert lost_of(NOW - GRACE_MS, r2=stands) == []
-    assert lost_of(NOW - GRACE_MS - 1, r2=stands) == ["peer-lost:r2"]
-    assert lost_of(NOW - 1, r2=damped) == ["peer-lost:r2"]
+def test_whose_status_stops_the_others(said: Status, since: int, lost: bool) -> None:
+    """Who has not spoken is not missed."""
+    assert lost_of(since, r2=said, r3=status(NOW, WALK)) == (["peer-lost:r2"] if lost else [])
+    assert lost_of(since, r3=status(NOW, WALK)) == []
 
 
 def test_all_are_ready_once_each_has_said_so() -> None:
@@ -253,41 +246,27 @@ def test_a_robot_stands_up_once_the_others_rest() -> None:
     assert RULES.peers_rest({"r2": stands}, since + GRACE_MS + 1, since)
 
 
-def pair(**team: Any) -> tuple[Rollout, Callable[[int], dict[str, Outputs]]]:
-    """Two robots that plan with each other, and a function that lets them walk until a tick."""
-    config = replace(CONFIG, team=replace(CONFIG.team, **team))
-    rollout = Rollout(config, simple_predictor(config), every_100_ms)
-
-    def run(until: int) -> dict[str, Outputs]:
-        while rollout.world.tick < until:
-            outputs = rollout.step().outputs
-        return dict(outputs)
-
-    return rollout, run
-
-
-def deaf(agent: Any, begin: int, end: int) -> Any:
+class Deaf:
     """An agent that hears nothing of its peers, and loses samples, for some ticks."""
 
-    class Deaf:
-        def step(self, state: Any, inputs: Inputs) -> Any:
-            if begin <= inputs.state.tick < end:
-                inputs = Inputs(inputs.state, references=inputs.references)
-            return agent.step(state, inputs)
+    def __init__(self, agent: Any, begin: int, end: int) -> None:
+        self._agent, self._deaf = agent, range(begin, end)
 
-    return Deaf()
+    def step(self, state: Any, inputs: Inputs) -> Any:
+        if inputs.state.tick in self._deaf:
+            inputs = Inputs(inputs.state, references=inputs.references)
+        return self._agent.step(state, inputs)
 
 
 def test_a_pair_that_had_lost_each_other_walks_and_plans_on_together() -> None:
-    rollout, run = pair(auto_resume=True)
-    rollout.agents["r2"] = deaf(rollout.agents["r2"], 1000, 1500)
-    at_rest = run(3500)
-    assert {o.mode for o in at_rest.values()} == {STAND}
-    assert all(o.reason.startswith("peer-lost") for o in at_rest.values())
-    begun = run(3501)  # both at once
-    assert {name: o.mode for name, o in begun.items()} == {"r1": WALK, "r2": WALK}
-    later = run(5000)
-    assert {o.mode for o in later.values()} == {WALK}
+    config = replace(CONFIG, team=replace(CONFIG.team, auto_resume=True))
+    rollout = Rollout(config, simple_predictor(config), every_100_ms)
+    rollout.agents["r2"] = Deaf(rollout.agents["r2"], 1000, 1500)  # type: ignore[assignment]
+    found = {tick.tick: tick.outputs for tick in rollout.ticks(5000)}
+    assert {o.mode for o in found[3499].values()} == {STAND}
+    assert all(o.reason.startswith("peer-lost") for o in found[3499].values())
+    assert {name: o.mode for name, o in found[3500].items()} == {"r1": WALK, "r2": WALK}
+    assert {o.mode for o in found[4999].values()} == {WALK}
     used = {name: state.planning.planner.planner.step for name, state in rollout.states.items()}
     assert set(used.values()) == {4960 // 40}
     assert not rollout.world.fallen()

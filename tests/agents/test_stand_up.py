@@ -79,10 +79,9 @@ def test_it_stands_only_once_its_joints_are_there_and_the_trunk_is_level() -> No
     end = FROM + 1500 + 200
     leaning = replace(standing(end), imu_quat_wxyz=rolled(0.5))
     for state in (standing(end - 10), leaning, lying(end)):
-        assert RULES.step(UP, MOVING, Inputs(state), may_move=True).mode == UP
-    up = RULES.step(UP, MOVING, Inputs(standing(end)), may_move=True)
-    assert up.mode == Mode(STAND, end, "reset:ann")
-    assert up.stand_up is None
+        assert RULES.step(UP, MOVING, Inputs(state), may_move=True)[0] == UP
+    mode, stand_up, _ = RULES.step(UP, MOVING, Inputs(standing(end)), may_move=True)
+    assert (mode, stand_up) == (Mode(STAND, end, "reset:ann"), None)
 
 
 @pytest.mark.parametrize(
@@ -97,10 +96,10 @@ def test_it_stands_only_once_its_joints_are_there_and_the_trunk_is_level() -> No
     ],
 )
 def test_a_fall_and_an_emergency_stop_damp_it_again(inputs: Inputs, after: Mode) -> None:
-    damped = RULES.step(UP, MOVING, inputs, may_move=True)
-    assert damped.mode == after
-    assert not damped.command.kp.any()
-    assert (damped.command.kd == CONFIG.controller.damping).all()
+    mode, _, command = RULES.step(UP, MOVING, inputs, may_move=True)
+    assert mode == after
+    assert not command.kp.any()
+    assert (command.kd == CONFIG.controller.damping).all()
 
 
 @pytest.mark.parametrize("lies_ms", [30, 2000], ids=["sinking", "lying"])

@@ -129,13 +129,10 @@ def test_gravity_takes_the_place_of_an_accelerometer(accel: float) -> None:
             assert np.linalg.norm(read.state.imu_accel) == pytest.approx(GRAVITY)
 
 
-def test_without_any_reading_the_trunk_is_level() -> None:
+def test_without_any_reading_the_trunk_is_level_and_after_a_pause_a_joint_is_anywhere() -> None:
     read = VALIDATOR.step(None, with_imu(standing(0), OFF, ZERO, ZERO), DT)
     np.testing.assert_array_equal(read.state.imu_quat_wxyz, [1.0, 0.0, 0.0, 0.0])
     np.testing.assert_array_equal(read.state.imu_accel, [0.0, 0.0, GRAVITY])
-
-
-def test_after_a_pause_a_joint_may_be_anywhere() -> None:
     read = VALIDATOR.step(None, moving(0), DT)
     away = with_knee(moving(2000), A1.q_stand[KNEE] - 0.5)
     assert VALIDATOR.step(read.memory, away, 2.0).complete
@@ -147,12 +144,6 @@ def test_a_motor_without_its_angle_bears_a_quarter_of_the_weight() -> None:
     lever = A1.geometry.link * abs(np.sin(thigh + calf))  # of a vertical force at the foot
     bears = lever * GRAVITY * A1.geometry.mass / 4.0
     assert abs(standing_torques(A1)[KNEE]) == pytest.approx(bears, rel=0.03)
-    first = VALIDATOR.step(None, standing(0), DT)
-    read = VALIDATOR.step(first.memory, with_knee(standing(1), 0.0), DT)
-    _, command = VALIDATOR.stand(None, read)
-    assert command.kp[KNEE] == command.kd[KNEE] == 0.0
-    assert np.all(np.delete(command.kp, KNEE) > 0.0)
-    assert abs(command.tau[KNEE]) == pytest.approx(bears, rel=0.03)
 
 
 @pytest.mark.parametrize("robots", [1, 2])
@@ -163,6 +154,7 @@ def test_a_motor_without_its_angle_bears_a_quarter_of_the_weight() -> None:
         "imu off 2",
         "encoder_FL_calf off 2",
         "encoder_RL_calf garbage 2 0.5",
+        "imu off 2 0.01",
     ],
 )
 def test_a_robot_that_walks_stands_and_does_not_fall(fault: str, robots: int) -> None:
@@ -176,14 +168,7 @@ def test_a_robot_that_walks_stands_and_does_not_fall(fault: str, robots: int) ->
             modes.append(mode)
     lost = "imu-lost" if fault.startswith("imu") else f"encoder-lost:{fault[8:].split()[0]}"
     assert rollout.world.fallen() == ()
-    brief = robots > 1 and fault.endswith("0.5")  # yokes keep it level meanwhile
+    assert tick.outputs["r1"].counters[f"{lost.partition('-')[0]}_invalid"] > 0
+    # A moment stops nobody, and yokes keep a robot level meanwhile.
+    brief = fault.endswith("0.01") or (robots > 1 and fault.endswith("0.5"))
     assert modes == [("stand", ""), ("walk", ""), *([] if brief else [("stand", lost)])]
-
-
-def test_a_moment_without_a_reading_stops_nobody() -> None:
-    fault = {"world.faults": "r1/imu off 2 0.01"}
-    config = load(None, {"team.robots": 1, "planner.kind": "none"} | fault)
-    rollout = Rollout(config, None, references_of(config))
-    *_, last = rollout.ticks(3000)
-    assert (last.outputs["r1"].mode, rollout.world.fallen()) == ("walk", ())
-    assert last.outputs["r1"].counters["imu_invalid"] > 0

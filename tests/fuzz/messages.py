@@ -10,8 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from quadriga.agents.inbox.inbox import Inbox
-from quadriga.agents.inbox.intake_log import parse_message_id
+from quadriga.agents.inbox import Inbox, parse_message_id
 from quadriga.agents.planning.interface import Expected
 from quadriga.drive.client import ControlLink
 from quadriga.drive.driver_words import read_driver_word

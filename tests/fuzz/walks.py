@@ -15,7 +15,7 @@ import numpy as np
 from mcap.writer import CompressionType, Writer
 
 from quadriga.agents.agent import Agent
-from quadriga.agents.inbox.inbox import Inbox
+from quadriga.agents.inbox import Inbox
 from quadriga.api.run import Run
 from quadriga.export.csv_files import write_csv
 from quadriga.export.source import Source

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from itertools import groupby
 
 from quadriga.agents.agent import Agent
-from quadriga.agents.inbox.inbox import Inbox
+from quadriga.agents.inbox import Inbox
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.codec import encode
 from quadriga.shared.config.sections import Config
@@ -30,7 +30,7 @@ def rerun(
     memory, sent = agent.initial(), []
     for _, packets in groupby(entries, key=lambda entry: entry.tick):
         for entry in packets:
-            if entry.key in arrivals.keys:
+            if entry.key in arrivals.topics:
                 arrivals.take(entry.key, entry.payload)
         state = arrivals.pop_state()
         if state is None:

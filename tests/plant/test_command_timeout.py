@@ -42,24 +42,28 @@ def test_what_motors_do_goes_by_the_age_of_the_command(age: int, does: str) -> N
     assert follow([age]) == [does]
 
 
-def test_an_age_that_dithers_about_the_limit_does_not_have_them_change_with_it() -> None:
-    ages = [19, 20, 20, 21, *(20 + k % 3 - 1 for k in range(300))]
-    assert follow(ages) == ["follow"] * 3 + ["hold"] * 301
+PROMPT = [10] * (PROMPT_TICKS - 1)
 
 
-def test_a_late_robot_is_followed_again_once_its_commands_are_prompt() -> None:
-    prompt = [10] * (PROMPT_TICKS - 1)
-    # 11 is not prompt, so it begins to count anew.
-    does = follow([18, 21, 200, *prompt, 11, *prompt, 10, 20, 1])
-    assert does == ["follow", *["hold"] * (2 + 2 * len(prompt) + 1), *["follow"] * 3]
-
-
-def test_commands_that_are_always_late_are_lost() -> None:
-    assert follow([22] * (MOST_HELD_MS + 1)) == ["hold"] * MOST_HELD_MS + ["lost"]
-
-
-def test_before_the_first_command_the_joints_are_held_for_as_long_as_the_team_stands() -> None:
-    assert follow([None] * (FIRST + 1)) == ["hold"] * FIRST + ["lost"]
+@pytest.mark.parametrize(
+    ("ages", "does"),
+    [
+        # One that dithers about the limit does not have them change with it.
+        ([19, 20, 20, 21, *(20 + k % 3 - 1 for k in range(300))], ["follow"] * 3 + ["hold"] * 301),
+        # It is followed again once its commands are prompt; 11 is not, so it counts anew.
+        (
+            [18, 21, 200, *PROMPT, 11, *PROMPT, 10, 20, 1],
+            ["follow", *["hold"] * (2 + 2 * len(PROMPT) + 1), *["follow"] * 3],
+        ),
+        ([22] * (MOST_HELD_MS + 1), ["hold"] * MOST_HELD_MS + ["lost"]),
+        ([None] * (FIRST + 1), ["hold"] * FIRST + ["lost"]),  # for as long as the team stands
+    ],
+    ids=["dithers", "prompt again", "always late", "never came"],
+)
+def test_a_late_robot_is_held_until_it_is_prompt_or_lost(
+    ages: list[int | None], does: list[str]
+) -> None:
+    assert follow(ages) == does
 
 
 def test_the_joints_are_held_where_they_were_when_the_command_became_late() -> None:

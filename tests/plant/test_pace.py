@@ -97,6 +97,7 @@ def test_both_begin_at_one_instant_and_keep_the_pace_of_the_system_clock(
     assert leads._start - MS < begun, "none begins before T0"
     assert ended > leads._start + 299 * MS
     assert abs(leads._start - follows._start) < MS, "here it is the same clock"
+    assert not follows.start(pause, lambda: True), "it is told to stop"
 
 
 def of_plant(config: Config, name: str) -> TeamPace:
@@ -145,7 +146,3 @@ def test_a_clock_that_is_off_is_refused_and_the_remedy_named(
         of_plant(config, "plant_r2").check_clock()
     assert (raised.value.name, raised.value.got) == ("system clock of plant_r2", got)
     assert said is None or "PTP" in raised.value.cause
-
-
-def test_who_is_told_to_stop_while_it_waits_stops(paces: dict[str, TeamPace]) -> None:
-    assert not paces["plant_r2"].start(pause, lambda: True)

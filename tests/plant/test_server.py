@@ -65,10 +65,17 @@ def test_a_malformed_command_is_reported_in_few_words(body: dict[str, object]) -
     assert len(event.detail) < 300
 
 
-def test_a_detail_is_cut_to_what_an_event_may_hold() -> None:
+def test_what_is_announced_fits_an_event_and_cannot_forge_the_terminal(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     server, listener = served()
     server.announce(codes.MALFORMED, "r1", "x" * (MAX_TEXT + 1))
     assert listener.events()[0].detail == "x" * (MAX_TEXT - 1) + "…"
+    capsys.readouterr()
+    server.announce(codes.MALFORMED, "", "1 commands dropped: \x1b[2J\nstop")
+    said = capsys.readouterr().err
+    assert "\x1b" not in said
+    assert said.count("\n") == 1
 
 
 @pytest.mark.parametrize("mode", ["lockstep", "realtime"])
@@ -109,12 +116,6 @@ class BlindPlant(Plant):
         self.tick += 1
         return [Event.of(1, self._down, "r1", "")] if self._down and self.tick == 1 else []
 
-    def truth(self) -> None:
-        return None
-
-    def settle(self) -> None:
-        pass
-
 
 @pytest.mark.parametrize(
     ("down", "last"),
@@ -153,16 +154,6 @@ def test_no_command_of_a_tick_counts_that_came_before_the_robot_s_state_of_it(mo
     for packet in listener.drain():
         server.take(*packet, oldest=0)
     assert server.commands.latest["r1"].tau[0] == 1.0
-
-
-def test_what_is_forged_in_an_event_does_not_reach_the_terminal(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    server, _ = served()
-    server.announce(codes.MALFORMED, "", "1 commands dropped: \x1b[2J\nstop")
-    said = capsys.readouterr().err
-    assert "\x1b" not in said
-    assert said.count("\n") == 1
 
 
 def test_an_unstable_simulation_ends_the_walk_at_once_and_is_an_error() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from quadriga.agents.inbox.inbox import Inbox
+from quadriga.agents.inbox import Inbox
 from quadriga.shared import members
 from quadriga.shared.config.load import load
 from quadriga.shared.config.timing import max_ages, periods

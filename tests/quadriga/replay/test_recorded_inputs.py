@@ -12,8 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from quadriga.agents.agent import Agent
-from quadriga.agents.inbox.inbox import Inbox, Order, Source, order_of
-from quadriga.agents.inbox.intake_log import Intake, format_message_id, list_messages
+from quadriga.agents.inbox import Inbox, Order, Source, format_message_id, list_messages, order_of
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.replay.agent_log import AgentLog
 from quadriga.replay.recorded_inputs import RecordedInputs, StepInputs
@@ -133,7 +132,7 @@ def simulate_walk(
     rng = np.random.default_rng(seed)
     config, agent = AGENTS[mode]
     inbox, log = Inbox(config, "r2", agent.peers), AgentLog()
-    intake, traffic = Intake(config, inbox), Traffic(log)
+    traffic = Traffic(log)
 
     def delay() -> int:
         return 1 + (int(rng.integers(200)) if rng.random() < late else 0)
@@ -153,7 +152,7 @@ def simulate_walk(
         state = inbox.pop_state()
         assert state is not None
         inputs = inbox.pop_inputs(state, awaited)
-        record = intake.record(last, inputs, awaited)
+        record = inbox.record(last, inputs, awaited)
         if record is not None:
             log.records[tick] = record
         last = log.last = tick
@@ -197,11 +196,11 @@ def test_a_replay_takes_in_what_the_agent_took_in(
     early: list[tuple[int, int]],
 ) -> None:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("quadriga.agents.inbox.inbox._HELD", held)
-        patch.setattr("quadriga.agents.inbox.inbox.AHEAD_MS", 100)
+        patch.setattr("quadriga.agents.inbox._HELD", held)
+        patch.setattr("quadriga.agents.inbox.AHEAD_MS", 100)
         log, taken = simulate_walk(mode, seed, late, skipped, second, early)
         patch.undo()
-        patch.setattr("quadriga.agents.inbox.inbox.AHEAD_MS", 100)
+        patch.setattr("quadriga.agents.inbox.AHEAD_MS", 100)
         steps = handed_over(mode, log)
     assert not [step.missing for step in steps if step.missing]
     again = [(step.tick, list_messages(step.inputs)) for step in steps if step.inputs is not None]

@@ -10,8 +10,7 @@ import pytest
 from rich.console import Console
 
 from quadriga.agents.agent import Agent
-from quadriga.agents.inbox.inbox import Inbox
-from quadriga.agents.inbox.intake_log import Intake
+from quadriga.agents.inbox import Inbox
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.predictor.store import predictor_sha256, save
 from quadriga.commands.parser import main
@@ -123,7 +122,7 @@ def test_a_stop_that_could_not_be_read_is_handed_over_where_it_was_taken_in(tmp_
     run, config = tmp_path / "run.mcap", configured()
     agent = Agent(config, "r1", None)
     arrivals = Inbox(config, "r1", agent.peers)
-    memory, intake = agent.initial(), Intake(config, arrivals)
+    memory = agent.initial()
     with RecordingWriter(run, build_metadata(config, "")) as to:
         for tick in range(5):
             reference = encode(Reference(0, 0, 0.0, 0.0, 0.0, 0.26))
@@ -134,7 +133,7 @@ def test_a_stop_that_could_not_be_read_is_handed_over_where_it_was_taken_in(tmp_
                 arrivals.take("team/estop", b"stop!")
                 to.write("team/estop", b"stop!", 3)
             inputs = arrivals.pop_inputs(standing(tick), awaited := agent.expected(tick))
-            if record := intake.record(tick - 1, inputs, awaited):
+            if record := arrivals.record(tick - 1, inputs, awaited):
                 to.write("team/r1/inputs", encode(record), tick)
             memory, outputs = agent.step(memory, inputs)
             to.write("team/r1/state", encode(standing(tick)), tick)
@@ -185,11 +184,11 @@ def test_a_planner_that_keeps_state_in_its_instance_is_found_and_named(
     run, config = tmp_path / "run.mcap", configured(**options)
     agent = Agent(config, "r1", None, collected=list)
     arrivals = Inbox(config, "r1", ())
-    memory, intake = agent.initial(), Intake(config, arrivals)
+    memory = agent.initial()
     with RecordingWriter(run, build_metadata(config, "")) as to:
         for tick in range(200):
             inputs = arrivals.pop_inputs(standing(tick), awaited := agent.expected(tick))
-            if record := intake.record(tick - 1, inputs, awaited):
+            if record := arrivals.record(tick - 1, inputs, awaited):
                 to.write("team/r1/inputs", encode(record), tick)
             memory, outputs = agent.step(memory, inputs)
             to.write("team/r1/state", encode(standing(tick)), tick)

@@ -8,12 +8,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from quadriga.agents.inbox.inbox import Inbox
-from quadriga.agents.planning.interface import Expected
+from quadriga.agents.inbox import Inbox, format_message_id, list_messages, parse_message_id
+from quadriga.agents.planning.interface import NOTHING, Expected
+from quadriga.agents.step_io import Inputs
 from quadriga.shared.codec import encode
 from quadriga.shared.config.load import load
 from quadriga.shared.messages import (
+    Consumed,
     EStop,
     Event,
     Measurement,
@@ -27,8 +31,6 @@ from quadriga.shared.messages import (
 )
 from quadriga.shared.topics import ESTOP, REQUESTS, TABLE, Topic
 from tests.a1 import standing
-
-NOTHING = Expected()
 
 
 def arrivals(
@@ -67,12 +69,12 @@ def test_subscribes_to_what_it_needs_and_no_more() -> None:
     alone = {"team/r2/state", "team/reference", "team/sim/event"}
     alone |= {f"team/{word.name}" for word in REQUESTS}
     peers = {f"team/{r}/{t}" for r in ("r1", "r3") for t in ("plan", "measurement")}
-    assert {*arrivals(planner="none").keys} == alone
-    assert {*arrivals(planner="centralised").keys} == alone | {"team/r2/plan"}
+    assert {*arrivals(planner="none").topics} == alone
+    assert {*arrivals(planner="centralised").topics} == alone | {"team/r2/plan"}
     statuses = {"team/r1/status", "team/r3/status"}
-    assert {*arrivals("realtime", planner="none").keys} == alone | statuses
-    assert {*arrivals().keys} == alone | peers
-    assert {*arrivals(estimator="truth").keys} == alone | peers | {"team/sim/truth"}
+    assert {*arrivals("realtime", planner="none").topics} == alone | statuses
+    assert {*arrivals().topics} == alone | peers
+    assert {*arrivals(estimator="truth").topics} == alone | peers | {"team/sim/truth"}
 
 
 @pytest.mark.parametrize("topic", TABLE, ids=lambda topic: topic.name)
@@ -93,41 +95,29 @@ def test_malformed_messages_on_any_key_are_dropped_and_counted(
     assert inputs.truth is None
 
 
-def test_the_newest_state_counts_and_the_others_are_counted() -> None:
-    box = arrivals()
-    feed(box, *(("r2/state", standing(tick)) for tick in (1, 2, 3)))
-    state = box.pop_state()
-    assert state is not None
-    assert state.tick == 3
-    assert box.counters["states_passed_over"] == 2
-    assert box.pop_state() is None
+def pop_ticks(box: Inbox) -> list[int]:
+    found = iter(box.pop_state, None)
+    return [state.tick for state in found if state is not None]
+
+
+def test_the_newest_state_counts_in_whatever_order_and_the_others_are_counted() -> None:
+    for order in permutations((4, 5, 6)):
+        box = arrivals()
+        feed(box, *(("r2/state", standing(tick)) for tick in order))
+        assert box.has_state
+        assert pop_ticks(box) == [6]
+        assert box.counters["states_passed_over"] == 2
+        feed(box, ("r2/state", standing(5)), ("r2/state", standing(6)))
+        assert pop_ticks(box) == []
 
 
 def test_the_state_at_which_a_sample_ends_is_not_passed_over() -> None:
     box = arrivals()
     feed(box, *(("r2/state", standing(tick)) for tick in (9, 10, 11, 12)))
-    ticks = []
-    while box.has_state:
-        state = box.pop_state()
-        assert state is not None
-        ticks.append(state.tick)
-    assert ticks == [10, 12]
+    assert pop_ticks(box) == [10, 12]
     assert box.counters["states_passed_over"] == 2
     feed(box, *(("r2/state", standing(tick)) for tick in (20, 21, 30, 31)))
-    late = [box.pop_state(), box.pop_state(), box.pop_state()]
-    assert [state and state.tick for state in late] == [30, 31, None]
-
-
-def test_of_states_in_any_order_the_newest_counts_and_none_before_it() -> None:
-    for order in permutations((4, 5, 6)):
-        box = arrivals()
-        feed(box, *(("r2/state", standing(tick)) for tick in order))
-        state = box.pop_state()
-        assert state is not None
-        assert state.tick == 6
-        assert box.counters["states_passed_over"] == 2
-        feed(box, ("r2/state", standing(5)), ("r2/state", standing(6)))
-        assert box.pop_state() is None
+    assert pop_ticks(box) == [30, 31]
 
 
 @pytest.mark.parametrize("mode", ["lockstep", "realtime"])
@@ -181,75 +171,51 @@ def test_the_order_of_arrival_does_not_matter() -> None:
 
 def test_lock_step_hands_over_at_the_tick_that_awaits_and_never_earlier() -> None:
     box = arrivals()
-    feed(
-        box,
-        ("r1/plan", plan(1)),
-        ("r1/plan", plan(2)),
-        ("r1/measurement", measurement(80)),
-        ("reference", reference(0)),
-        ("reference", reference(100)),
-    )
+    feed(box, ("r1/plan", plan(1)), ("r1/plan", plan(2)), ("r1/measurement", measurement(80)))
+    feed(box, ("reference", reference(0)), ("reference", reference(100)))
     assert box.pop_inputs(standing(41), NOTHING).plans == ()
-    inputs = box.pop_inputs(standing(80), Expected((1, 0), 40, 0))
-    assert [p.step for _, p in inputs.plans] == [1]
-    assert inputs.measurements == ()
-    assert [r.tick for r in inputs.references] == [0]
-    inputs = box.pop_inputs(standing(120), Expected((2, 0), 80, 100))
-    assert [p.step for _, p in inputs.plans] == [2]
-    assert [m.tick for _, m in inputs.measurements] == [80]
-    assert [r.tick for r in inputs.references] == [100]
+    handed_over = []
+    for tick, expected in ((80, Expected((1, 0), 40, 0)), (120, Expected((2, 0), 80, 100))):
+        inputs = box.pop_inputs(standing(tick), expected)
+        plans, samples = [p.step for _, p in inputs.plans], [m.tick for _, m in inputs.measurements]
+        handed_over.append((plans, samples, [r.tick for r in inputs.references]))
+    assert handed_over == [([1], [], [0]), ([2], [80], [100])]
 
 
 def test_real_time_hands_over_all_that_has_come_once() -> None:
     box = arrivals("realtime")
+    walks, stands = (
+        Status(tick, 0, mode, "", "", {}, {}, np.zeros(0), np.zeros(0))
+        for tick, mode in ((100, "walk"), (103, "stand"))
+    )
     feed(box, ("r1/plan", plan(9)), ("r3/measurement", measurement(990)))
-    inputs = box.pop_inputs(standing(7), NOTHING)
+    feed(box, ("r3/status", walks), ("r1/status", stands))
+    inputs = box.pop_inputs(standing(104), NOTHING)
     assert (len(inputs.plans), len(inputs.measurements)) == (1, 1)
-    assert box.pop_inputs(standing(8), NOTHING).plans == ()
+    assert [(n, said.mode) for n, said in inputs.statuses] == [("r1", "stand"), ("r3", "walk")]
+    assert not inputs.bare
+    assert box.pop_inputs(standing(105), NOTHING).bare
 
 
 def test_who_owes_what() -> None:
     box = arrivals(estimator="truth")
     expected = Expected(plan=(1, 0), measurement_tick=40, reference_tick=0, truth=True)
-    everyone = {
-        ("plan", "r1"),
-        ("plan", "r3"),
-        ("measurement", "r1"),
-        ("measurement", "r3"),
-        ("reference", "operator"),
-        ("sim/truth", "sim"),
-    }
-    assert box.missing_sources(80, expected) == everyone
+    behind = {("plan", "r3"), ("measurement", "r3"), ("sim/truth", "sim")}
+    on_time = {("plan", "r1"), ("measurement", "r1"), ("reference", "operator")}
+    assert box.missing_sources(80, expected) == behind | on_time
     assert box.missing_sources(80, NOTHING) == frozenset()
-    feed(
-        box,
-        ("r1/plan", plan(1)),
-        ("r3/plan", plan(0)),
-        ("r1/measurement", measurement(40)),
-        ("r3/measurement", measurement(30)),
-        ("reference", reference(0)),
-    )
-    assert box.missing_sources(80, expected) == {
-        ("plan", "r3"),
-        ("measurement", "r3"),
-        ("sim/truth", "sim"),
-    }
+    feed(box, ("r1/plan", plan(1)), ("r3/plan", plan(0)), ("reference", reference(0)))
+    feed(box, ("r1/measurement", measurement(40)), ("r3/measurement", measurement(30)))
+    assert box.missing_sources(80, expected) == behind
 
 
 def test_an_emergency_stop_and_the_end_are_never_held_back() -> None:
     box = arrivals()
-    feed(
-        box, ("estop", EStop(5, 5, "tripped")), ("sim/event", Event(5, 5, "push", "r1", "", "push"))
-    )
+    feed(box, ("estop", EStop(5, 5, "trip")), ("sim/event", Event(5, 5, "push", "r1", "", "push")))
     assert not box.ended
-    estop = box.pop_inputs(standing(6), NOTHING).estop
-    assert estop is not None
-    assert estop.reason == "tripped"
-    feed(
-        box,
-        ("sim/event", Event(7, 7, "stop", "", "", "signal")),
-        ("sim/event", Event(8, 8, "fall", "", "", "fall")),
-    )
+    assert box.pop_inputs(standing(6), NOTHING).estop == EStop(5, 5, "trip")
+    feed(box, ("sim/event", Event(7, 7, "stop", "", "", "signal")))
+    feed(box, ("sim/event", Event(8, 8, "fall", "", "", "fall")))
     assert box.ended
 
 
@@ -294,19 +260,8 @@ def test_a_reference_that_nobody_may_configure_is_dropped(change: dict[str, Any]
 
 
 def truth(robots: tuple[str, ...], rows: int, quat: float = 0.5) -> Truth:
-    zero = np.zeros((rows, 3))
-    return Truth(
-        0,
-        0,
-        robots,
-        zero,
-        np.full((rows, 4), quat),
-        zero,
-        zero,
-        np.zeros((rows, 4, 3)),
-        np.zeros(0),
-        np.zeros(0),
-    )
+    zero, quats, feet = np.zeros((rows, 3)), np.full((rows, 4), quat), np.zeros((rows, 4, 3))
+    return Truth(0, 0, robots, zero, quats, zero, zero, feet, np.zeros(0), np.zeros(0))
 
 
 @pytest.mark.parametrize(
@@ -329,15 +284,6 @@ def test_a_truth_that_says_nothing_of_the_robot_is_dropped(wrong: Truth) -> None
     assert box.pop_inputs(standing(0), expected).truth is not None
 
 
-def test_a_state_is_dropped_with_an_attitude_that_no_imu_says_and_kept_without_any() -> None:
-    box = arrivals()
-    feed(box, ("r2/state", replace(standing(5), imu_quat_wxyz=np.full(4, 10.0))))
-    assert box.pop_state() is None
-    assert box.counters["dropped_state"] == 1
-    feed(box, ("r2/state", replace(standing(5), imu_quat_wxyz=np.zeros(4))))
-    assert box.pop_state() is not None
-
-
 @pytest.mark.parametrize(
     ("field", "number"),
     [
@@ -345,6 +291,7 @@ def test_a_state_is_dropped_with_an_attitude_that_no_imu_says_and_kept_without_a
         ("q_joint", -8.0),
         ("v_joint", 3500.0),
         ("tau_joint", 400.0),
+        ("imu_quat_wxyz", 10.0),
         ("imu_gyro", -3500.0),
         ("imu_accel", 2e4),
         ("foot_force", 1e5),
@@ -356,10 +303,10 @@ def test_a_state_that_no_sensor_can_tell_is_dropped(field: str, number: float) -
     numbers[-1] = number
     changed: Any = {field: numbers}
     feed(box, ("r2/state", replace(good, **changed)))
-    assert box.pop_state() is None
+    assert pop_ticks(box) == []
     assert box.counters["dropped_state"] == 1
-    feed(box, ("r2/state", good))
-    assert box.pop_state() is not None, "the robot's own still counts"
+    feed(box, ("r2/state", replace(good, imu_quat_wxyz=np.zeros(4))))
+    assert pop_ticks(box) == [5], "the robot's own still counts, even without an attitude"
 
 
 def test_a_release_that_comes_twice_is_one_and_another_is_another() -> None:
@@ -373,14 +320,92 @@ def test_a_release_that_comes_twice_is_one_and_another_is_another() -> None:
     assert box.pop_inputs(standing(8), NOTHING).stop == SafeStop(5, 5, "ann", False)
 
 
-def test_in_real_time_statuses_of_the_others_are_handed_over_as_they_come() -> None:
-    box = arrivals("realtime", planner="none")
-    walks, stands = (
-        Status(tick, 0, mode, "", "", {}, {}, np.zeros(0), np.zeros(0))
-        for tick, mode in ((100, "walk"), (103, "stand"))
+@pytest.mark.parametrize("announced", [3, 7, 2**41])
+def test_an_announced_end_is_forgotten_once_time_goes_on(announced: int) -> None:
+    """A stranger may announce one, of any time: afterwards a pause of the team is no end."""
+    box = arrivals()
+    feed(box, ("r2/state", standing(5)), ("sim/event", Event(announced, 7, "stop", "", "", "end")))
+    assert box.ended
+    box.pop_state()
+    for tick in range(6, 1100):
+        feed(box, ("r2/state", standing(tick)))
+        box.pop_state()
+    assert not box.ended
+
+
+# ---- what an agent took in is told where no rule tells it, and only there
+
+PLAN = Plan(480, 0, 12, np.zeros((25, 12)), np.zeros((25, 6)), "solved", {}, 1)
+SAMPLE = Measurement(480, 0, np.zeros(12), np.zeros(6), np.ones(4))
+REFERENCE = Reference(500, 0, 0.5, 0.0, 0.0, 0.26)
+
+
+def of_pair(mode: str) -> Inbox:
+    """Of r2 that takes in r1's plans."""
+    return Inbox(load(None, {"world.mode": mode}), "r2", ("r1",))
+
+
+def full(tick: int) -> Inputs:
+    return Inputs(
+        standing(tick), (("r1", SAMPLE),), (("r1", PLAN),), (REFERENCE,), EStop(7, 7, "tripped")
     )
-    feed(box, ("r3/status", walks), ("r1/status", stands))
-    inputs = box.pop_inputs(standing(104), NOTHING)
-    assert [(n, said.mode) for n, said in inputs.statuses] == [("r1", "stand"), ("r3", "walk")]
-    assert not inputs.bare
-    assert box.pop_inputs(standing(105), NOTHING).bare
+
+
+@given(
+    topic=st.sampled_from(["plan", "measurement", "reference", "estop", "sim/truth"]),
+    sender=st.sampled_from(["r1", "r10", "planner", "operator", "anyone", "sim"]),
+    first=st.integers(0, 1 << 40),
+    second=st.integers(0, 9),
+)
+def test_references_lead_back(topic: str, sender: str, first: int, second: int) -> None:
+    order = (first, second if topic == "plan" else 0)
+    assert parse_message_id(format_message_id((topic, sender), order)) == ((topic, sender), order)
+
+
+@given(text=st.text(max_size=20))
+def test_foreign_references_are_no_error(text: str) -> None:
+    found = parse_message_id(text)
+    assert found is None or len(found) == 2
+
+
+def test_in_real_time_all_that_was_taken_in_is_listed() -> None:
+    said = Status(500, 0, "walk", "", "", {}, {}, np.zeros(0), np.zeros(0))
+    told = replace(full(541), statuses=(("r1", said),))
+    taken = ["plan:r1:12.1", "measurement:r1:480", "reference:operator:500", "status:r1:500"]
+    taken.append("estop:anyone:7")
+    record = of_pair("realtime").record(540, told, NOTHING)
+    assert record == Consumed(541, 541_000_000, 0, 0, tuple(taken), ())
+    assert [parse_message_id(text) for text in taken] == list_messages(told)
+
+
+def test_a_step_that_took_in_the_next_state_alone_needs_no_record() -> None:
+    box = of_pair("realtime")
+    assert box.record(-1, Inputs(standing(0)), NOTHING) is None
+    passed = box.record(0, Inputs(standing(3)), NOTHING)
+    assert passed is not None
+    assert (passed.number, passed.passed, passed.taken) == (0, 2, ())
+    again = box.record(3, full(4), NOTHING)
+    assert again is not None
+    assert again.number == 1
+
+
+def test_lock_step_tells_only_the_unusual() -> None:
+    box = of_pair("lockstep")
+    box.take("team/r1/plan", encode(PLAN))
+    box.take("team/r1/measurement", encode(SAMPLE))
+    expected = Expected((12, 1), 480)
+    usual = box.pop_inputs(standing(520), expected)
+    assert len(list_messages(usual)) == 2
+    late = Inputs(standing(521), plans=(("r1", PLAN),))  # the same once more: it was due before
+    stopped = Inputs(standing(524), estop=EStop(0, 0, ""))
+    told = [
+        (519, usual, expected, None),
+        (520, late, NOTHING, (("plan:r1:12.1",), ())),
+        (521, Inputs(standing(522)), Expected((13, 0)), ((), ("plan/r1",))),
+        (522, Inputs(standing(523)), NOTHING, None),
+        (523, stopped, NOTHING, (("estop:anyone:0",), ())),
+        (524, Inputs(standing(526)), NOTHING, ((), ())),  # a state was passed over
+    ]
+    for last, inputs, awaited, expected_record in told:
+        record = box.record(last, inputs, awaited)
+        assert (None if record is None else (record.taken, record.owed)) == expected_record
