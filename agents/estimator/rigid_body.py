@@ -419,20 +419,24 @@ def _eliminate(
     state: LegState, leg: int, reaction: Array, reduced: Array, M_inverse: Array
 ) -> None:
     """Fill F D⁻¹ of a leg and its D⁻¹, subtract F D⁻¹ Fᵀ from the trunk's block; D is its mass."""
-    xx, xy, xz, yy, yz, zz = state.mass
+    (F1, F2, F3), (xx, xy, xz, yy, yz, zz) = state.momentum, state.mass
     p, q, r = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy
     d = 1.0 / (xx * p + xy * q + xz * r)
-    s, yy_, zz_ = xy * xz - xx * yz, xx * zz - xz * xz, xx * yy - xy * xy
-    D_inverse = d * np.array([[p, q, r], [q, yy_, s], [r, s, zz_]])
-    F = np.empty((6, 3))
-    for joint in range(3):
-        for i in range(3):
-            F[i, joint] = state.momentum[joint][0][i]
-            F[3 + i, joint] = state.momentum[joint][1][i]
-    own = slice(3 * leg, 3 * leg + 3)
-    reaction[:, own] = product(F, D_inverse)
-    reduced -= product(reaction[:, own], F.T)
-    M_inverse[6:, 6:][own, own] = D_inverse
+    yy, yz, zz = d * (xx * zz - xz * xz), d * (xy * xz - xx * yz), d * (xx * yy - xy * xy)
+    xx, xy, xz = d * p, d * q, d * r
+    first = 3 * leg
+    for i in range(6):  # no products of matrices, which would allocate each of them
+        part, k = i // 3, i % 3
+        a, b, c = F1[part][k], F2[part][k], F3[part][k]
+        x, y, z = a * xx + b * xy + c * xz, a * xy + b * yy + c * yz, a * xz + b * yz + c * zz
+        reaction[i, first], reaction[i, first + 1], reaction[i, first + 2] = x, y, z
+        for j in range(i + 1):
+            part, k = j // 3, j % 3
+            reduced[i, j] -= x * F1[part][k] + y * F2[part][k] + z * F3[part][k]
+    block = M_inverse[6 + first : 9 + first, 6 + first : 9 + first]
+    block[0, 0], block[1, 1], block[2, 2] = xx, yy, zz
+    block[0, 1], block[0, 2], block[1, 2] = xy, xz, yz
+    block[1, 0], block[2, 0], block[2, 1] = xy, xz, yz
 
 
 @compiled
