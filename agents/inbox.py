@@ -70,7 +70,8 @@ class Inbox:
         received: valid messages by topic and sender.
         refused: whether a valid message that is no state was refused: too many were held, or it
             is of a time too far ahead.
-        ended: whether the end of the walk has been announced, and time has not gone on since.
+        ended: whether the end of the walk has been announced, and time has not gone on since, but
+            for what plants of single robots may be apart.
     """
 
     def __init__(self, config: Config, robot: str, peers: Sequence[str]) -> None:
@@ -99,6 +100,8 @@ class Inbox:
         self.received: Counter[Source] = Counter()
         self.refused = self.ended = False
         self._end = -1  # tick for which the end of the walk is announced
+        apart = config.team.plant_per_robot and not self._lockstep
+        self._apart_ms = round(1e3 * config.bus.clock_timeout) if apart else 0
         self._newest: dict[Source, Order] = {}
         self._held: defaultdict[Source, list[Any]] = defaultdict(list)
         # In lock-step nobody asks for what peers measure while they stand until they walk.
@@ -178,7 +181,7 @@ class Inbox:
             self.counters["states_passed_over"] += 1
             return
         self._newest_state = state.tick
-        self.ended = self.ended and state.tick <= self._end
+        self.ended = self.ended and state.tick <= self._end + self._apart_ms
         passed, self._state = self._state, state
         if passed is not None and passed.tick % SAMPLE_MS == 0:
             passed, self._sample_end = self._sample_end, passed

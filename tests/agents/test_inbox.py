@@ -333,6 +333,16 @@ def test_an_announced_end_is_forgotten_once_time_goes_on(announced: int) -> None
     assert not box.ended
 
 
+def test_a_plant_of_one_robot_may_go_on_for_as_long_as_plants_may_be_apart() -> None:
+    overrides = {"team.plant_per_robot": True, "team.yokes": "none", "world.mode": "realtime"}
+    box = Inbox(load(None, {"bus.clock_timeout": 0.5, **overrides}), "r2", ("r1",))
+    feed(box, ("r2/state", standing(5)), ("sim/event", Event(4, 4, "stop", "", "", "end")))
+    feed(box, ("r2/state", standing(504)))
+    assert box.ended
+    feed(box, ("r2/state", standing(505)))
+    assert not box.ended
+
+
 # ---- what an agent took in is told where no rule tells it, and only there
 
 PLAN = Plan(480, 0, 12, np.zeros((25, 12)), np.zeros((25, 6)), "solved", {}, 1)
