@@ -8,7 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from quadriga.agents.validate import AGREES_MS, Validated, Validator, standing_torques
+from quadriga.agents.validate import (
+    AGREES_MS,
+    HOLD_YOKED_MS,
+    Validated,
+    Validator,
+    standing_torques,
+)
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.config.load import load
 from quadriga.shared.messages import State
@@ -162,7 +168,10 @@ def test_a_robot_that_walks_stands_and_does_not_fall(fault: str, robots: int) ->
     config = load(None, given | {"world.faults": f"r1/{fault}"})
     rollout = Rollout(config, None, references_of(config))
     modes = list[tuple[str, str]]()
-    for tick in rollout.ticks(4500):
+    # Nobody here tells the other robot of the yoke to stand: it drags this one on. In real time it
+    # stands within a second.
+    dragged = robots > 1 and len(fault.split()) < 4
+    for tick in rollout.ticks(2000 + HOLD_YOKED_MS + 1000 if dragged else 4500):
         mode = tick.outputs["r1"].mode, tick.outputs["r1"].reason
         if mode not in modes:
             modes.append(mode)
