@@ -167,14 +167,14 @@ def test_data_are_collected_on_flat_and_empty_ground_without_a_planner() -> None
 
 
 class Tripped(Rollout):
-    """A walk that somebody ends at a given tick by throwing the robot over."""
+    """A walk that somebody ends at a given tick by laying the robot on its back."""
 
     at = 0
 
     def step(self) -> Tick:
         if self.world.tick == self.at:
-            self.world.physics.qvel[3] = 12.0  # rad/s about the trunk's x axis
-            self.world.physics.qvel[2] = 1.5
+            self.world.physics.qpos[2] += 0.2
+            self.world.physics.qpos[3:7] = 0.0, 1.0, 0.0, 0.0
         return super().step()
 
 
