@@ -48,6 +48,7 @@ def test_an_interrupted_collection(tmp_path: Path, number: signal.Signals, statu
     await_true(lambda: len(descendants(collection.pid)) >= 2)
     sleep(0.5)
     workers = descendants(collection.pid)
+    assert len(workers) >= 2
     kill = os.killpg if number == signal.SIGINT else os.kill  # the first as a terminal does
     kill(collection.pid, number)
     _, errors = collection.communicate(timeout=WAIT)

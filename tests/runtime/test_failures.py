@@ -90,7 +90,7 @@ def test_in_real_time_the_world_waits_for_no_frozen_listener(
     assert longest < 2.0
 
 
-@pytest.mark.parametrize("name", ["r2", "operator"])
+@pytest.mark.parametrize("name", ["sim", "r2", "operator"])
 def test_kill_9_of_one_stops_the_walk_and_names_it(make_team: Make, name: str) -> None:
     team = make_team(world__duration=FOREVER)
     with team.launch() as running:

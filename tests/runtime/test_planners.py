@@ -41,6 +41,7 @@ ROBOTS, SECONDS = 2, 1.2
 KINDS: dict[str, dict[str, object]] = {
     "centralised": {"planner.kind": "centralised", "planner.latency_ms": 8},
     "deepc": {"planner.kind": "deepc"},
+    "fast": {"planner.preset": "fast"},
     "cooperative": {"planner.cost": "team", "planner.exchanges": 1},
     "exchanged": {"planner.exchanges": 2, "planner.compensation": True, "planner.damping": 0.2},
 }

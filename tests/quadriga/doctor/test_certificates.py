@@ -15,6 +15,7 @@ from quadriga.doctor.certificates import check_certificates
 from quadriga.shared.bus.diagnostics import BAD, GOOD, NOTE
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
+from quadriga.shared.runtime.places import SOURCE
 
 NOW = datetime(2026, 11, 26, tzinfo=UTC)
 Spoil = Callable[[CertificateFolder], object]
@@ -72,6 +73,7 @@ def test_what_is_wrong_is_told_with_what_to_do(
     spoil(folder)
     found, good = check_certificates(of_team(folder), NOW)
     assert (found.code, found.verdict) == (f"certificate-{code}", verdict)
+    assert f"`{found.code}`" in (SOURCE / "docs" / "doctor.md").read_text(encoding="utf-8")
     assert "r2" in found.text
     assert found.remedy
     assert (good.code, good.verdict) == ("certificate", GOOD)

@@ -22,8 +22,10 @@ from quadriga.shared.bus.diagnostics import (
 from quadriga.shared.config.load import load
 from quadriga.shared.errors import BusError
 from quadriga.shared.members import Member, team_members
+from quadriga.shared.runtime.places import SOURCE
 from tests.shared.bus.abouts import NAMES, SIM, about, answer, view
 
+DOC = (SOURCE / "docs" / "doctor.md").read_text(encoding="utf-8")
 MEMBERS = {m.name: m for m in team_members(("r1", "r2"), central=False, recorded=False)}
 R2 = MEMBERS["r2"]
 EVERYBODY = (SIM, about("r1"), about("r2"))
@@ -31,7 +33,10 @@ WELL = [("ready", GOOD)]
 
 
 def codes(member: Member, seen: TeamView) -> list[tuple[str, str]]:
-    return [(item.code, item.verdict) for item in diagnose(member, seen)]
+    """What is found, each code of which is in the manual."""
+    found = diagnose(member, seen)
+    assert {item.code for item in found if f"`{item.code}`" not in DOC} == set()
+    return [(item.code, item.verdict) for item in found]
 
 
 def of_r2(**changes: Any) -> list[tuple[str, str]]:
@@ -137,6 +142,7 @@ def test_no_team_walks_with_one_that_differs_but_in_source_files(
     found = [*disagreements(said, seen)]
     assert [(item.verdict, item.text) for item in found] == [(verdict, text)] * bool(text)
     assert [item for item in diagnose(R2, view(said)) if item.code.startswith("other-")] == found
+    assert all(f"`{item.code}`" in DOC for item in found)
     assert not [*disagreements(said, replace(seen, lead=None))], "nobody knows what is right"
     if verdict == BAD:
         with pytest.raises(BusError, match=r"r2 of team 'team': got another .* \(.+\)"):
