@@ -15,7 +15,6 @@ import pytest
 
 from tests.deploy.dist import TOP, build_dist
 
-pytestmark = pytest.mark.nightly
 NEIGHBOUR = "openai-agents==0.24.0"  # installs a package `agents`
 FOLDERS = ("agents", "shared", "sim_server", "plant")
 # What a script sees of the installed package, far from its checkout.
@@ -117,6 +116,7 @@ def test_the_metadata_say_what_it_is(built: tuple[Path, Path]) -> None:
     assert "quadriga = quadriga.__main__:main" in scripts
 
 
+@pytest.mark.nightly
 def test_a_script_far_from_the_checkout_has_scenarios_and_experiments(
     environment: Path, tmp_path: Path
 ) -> None:
@@ -130,6 +130,7 @@ def test_a_script_far_from_the_checkout_has_scenarios_and_experiments(
         assert Path(place).is_relative_to(packages / "quadriga")
 
 
+@pytest.mark.nightly
 def test_a_team_walks_beside_a_package_named_agents(environment: Path, tmp_path: Path) -> None:
     """In a folder, too, in which other things have the names of this project's folders."""
     for name in FOLDERS:

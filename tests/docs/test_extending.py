@@ -31,7 +31,6 @@ def test_every_section_has_commands() -> None:
     assert all(SECTIONS.values())
 
 
-@pytest.mark.nightly
 @pytest.mark.parametrize("section", sorted(SECTIONS.keys() - TYPED_ELSEWHERE))
 def test_the_commands_of_a_section_run(section: str, tmp_path: Path) -> None:
     """In a folder with what they name of the checkout, so that nothing is left in that."""

@@ -19,7 +19,6 @@ from quadriga.shared.recording.reader import Recording
 from tests.plugins.kinds import install_package
 from tests.runtime.conftest import run_command
 
-pytestmark = pytest.mark.nightly
 TOP = Path(__file__).parents[2]
 PACKAGE = "tests/plugins/balance"
 
@@ -88,6 +87,7 @@ def test_the_documented_commands_know_it(place: Place, said: dict[str, str]) -> 
     assert "balance" in said["campaign"]
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("said")
 def test_without_the_package_a_recording_says_what_is_missing(place: Place) -> None:
     recording = str(place.folder / "runs" / "balance" / "run.mcap")
@@ -105,6 +105,7 @@ def test_its_options_are_checked(place: Place) -> None:
     assert "options of balance: speed, height, tilt (did you mean 'speed'?)" in done.stderr
 
 
+@pytest.mark.nightly
 def test_it_keeps_the_contract_of_all_planners(place: Place) -> None:
     test = str(TOP / "tests" / "plugins" / "test_contract.py")
     options = ("-vv", "-p", "no:cacheprovider", "-p", "no:xdist", "-k", "balance", "--rootdir")
@@ -114,6 +115,7 @@ def test_it_keeps_the_contract_of_all_planners(place: Place) -> None:
     assert len(re.findall(r"balance\] PASSED", done.stdout)) >= 8
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("said")
 def test_other_code_of_the_same_version_is_noticed(place: Place) -> None:
     """By a campaign, which does not go on with it, and by a replay, which differs and says why."""
