@@ -39,7 +39,7 @@ PATIENT: dict[str, Any] = {
     "bridge.speed_share": 1.5,
 }
 
-pytestmark = [pytest.mark.nightly, pytest.mark.usefixtures("_realtime", "_compiled")]
+pytestmark = pytest.mark.usefixtures("_compiled")
 
 
 @pytest.fixture
@@ -96,6 +96,8 @@ def modes_of(recording: Recording) -> list[str]:
     return [e.detail for e in recording.messages(Event) if e.code == "bridge-mode"]
 
 
+@pytest.mark.nightly
+@pytest.mark.usefixtures("_realtime")
 @pytest.mark.parametrize("config", ["a1"], indirect=True)
 def test_a_robot_stands_up_walks_and_lies_down_through_its_own_protocol(
     file: Path, robots: subprocess.Popen[bytes], tmp_path: Path
@@ -129,6 +131,8 @@ def replay_all(out: Path) -> str:
     return "" if whole and (done.returncode == 0 or lost) else said
 
 
+@pytest.mark.nightly
+@pytest.mark.usefixtures("_realtime")
 @pytest.mark.usefixtures("robots")
 @pytest.mark.parametrize("config", ["go2"], indirect=True)
 def test_a_bridge_hears_the_emergency_stop_whatever_its_agent_does(
@@ -180,6 +184,8 @@ def watchdogs() -> set[str]:
     return found
 
 
+@pytest.mark.nightly
+@pytest.mark.usefixtures("_realtime")
 @pytest.mark.usefixtures("robots")
 @pytest.mark.parametrize(
     ("config", "number"), [("a1", signal.SIGKILL), ("go2", signal.SIGSTOP)], indirect=["config"]
