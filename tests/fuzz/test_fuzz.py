@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from time import thread_time
 from types import FrameType
 from typing import Final
 
@@ -54,6 +55,7 @@ FEW = 20
 REFUSED = 0.25
 READ = ("traces", "exports", "replays", "realtime-replays")
 PATIENCE: Final = 60.0  # s of wall time, after which an input is given up
+MOST_S: Final = 5.0  # of processor time that an input may take
 MOST_MB: Final = 200.0  # that memory may grow
 LONGEST: Final = 2500  # characters of an error
 
@@ -82,7 +84,7 @@ def fuzz(target: Target, inputs: int, seed: int) -> Tally:
     before, tally = _peak_mb(), Tally(0, {})
     for number in range(inputs):
         content = target.make(np.random.default_rng([seed, number]))
-        place, told = "", ""
+        place, told, begun = "", "", thread_time()
         try:
             with _given_up_after(PATIENCE):
                 target.read(content)
@@ -91,6 +93,8 @@ def fuzz(target: Target, inputs: int, seed: int) -> Tally:
             place, told = "long error" if len(str(error)) > LONGEST else "", str(error)
         except (Exception, OverdueError) as error:
             place, told = _place_of(error), str(error)
+        if not place and thread_time() - begun > MOST_S:
+            place = f"more than {MOST_S:g} s"
         if not place and _peak_mb() - before > MOST_MB:
             place = f"more than {MOST_MB:g} MB"
         if place:
