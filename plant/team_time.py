@@ -21,7 +21,7 @@ from quadriga.shared.messages import Event
 from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.topics import CLOCK, EVENT, STATE
 
-_LOOKS: Final = 10  # one each sample: the last messages of a process may come after it has left
+_LOOKS: Final = 10  # one each sample: the announced end may come after who drives time has left
 _JUMP_MS: Final = 5000  # no plant of a team that still walks is so far ahead
 
 
@@ -57,7 +57,7 @@ class TeamTime:
         self.falls: list[Event] = []
         self._newest = dict.fromkeys(self._plants, -1)  # tick
         self._timeout = config.bus.clock_timeout  # s
-        self._looks_left = _LOOKS
+        self._looks_left = 1 if self.drives else _LOOKS  # none walks on without the others
 
     def take(self, key: str, payload: bytes, tick: int) -> None:
         """Take in a packet of one of `keys` at this plant's `tick`."""

@@ -49,7 +49,7 @@ class PredictorMeta:
 
     Attributes:
         kind: name of the fit, one of `KINDS`.
-        phases: parts of the period with a G of their own (see `time_grid.gait_phase`).
+        phases: parts of the period with a G of their own (see `agents.gait.gait_phase`).
         neighbours: "all", or "yoked": G_ij is zero unless i and j are yoked.
         controller: the low level, which is part of G.
         stand_ms: where the gait's period, and with it phase 0, begins.
@@ -184,7 +184,7 @@ class Predictor:
 
     @property
     def phases(self) -> int:
-        """P, the number of phases with a G of their own; `time_grid.phase_of` chooses."""
+        """P, the number of phases with a G of their own; `agents.gait.phase_of` chooses."""
         return self.meta.phases
 
     @property

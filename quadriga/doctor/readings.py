@@ -9,11 +9,12 @@ import platform
 import re
 import shutil
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Final, TypeVar
 
-from packaging.requirements import Requirement
+from packaging.requirements import InvalidRequirement, Requirement
 
 from quadriga.doctor.machine import MachineReadings
 from quadriga.shared.runtime.installed import PROJECT, shadowing_files
@@ -38,7 +39,10 @@ _CACHE_BYTES: Final = 200_000_000  # of machine code, and of data and predictors
 def read_machine() -> MachineReadings:
     """Look at this computer, as this user and in this folder; nothing is changed."""
     requirements = _read(_requirements)
-    names = [Requirement(line).name for line in requirements or ()]
+    names = list[str]()
+    for line in requirements or ():
+        with suppress(InvalidRequirement):  # `check_packages` names it
+            names.append(Requirement(line).name)
     versions = {name: _read(partial(importlib.metadata.version, name)) for name in names}
     return MachineReadings(
         realtime=_read(_may_take_realtime),

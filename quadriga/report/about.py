@@ -79,7 +79,7 @@ def list_facts(run: ReportedRun) -> Iterator[tuple[str, str]]:
     asked = config.reference
     speeds = f"vx {asked.vx:g} m/s, vy {asked.vy:g} m/s, wz {asked.wz:g} rad/s"
     rows = asked.trace.count(ROW_END)
-    yield "asked for", f"a trace of {rows} lines" if rows else asked.trace or speeds
+    yield "asked for", f"a trace of {rows} lines" if rows else speeds
     if config.team.agent_command:
         yield "controller", config.team.agent_command
     whose = ", for the team's cost" if is_cooperative(config) else ""

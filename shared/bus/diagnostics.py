@@ -186,10 +186,8 @@ def disagreements(process: About, view: TeamView) -> Iterator[Diagnosis]:
     if process.version != lead.version:
         yield _differs("version", process.version, lead, lead.version)
         return
-    own, its = _by_name(process.messages, " "), _by_name(lead.messages, " ")
-    shared = own.keys() & its.keys()  # topics of a plug-in need not be known to all
     for of, mine, theirs in (
-        ("messages", {n: own[n] for n in shared}, {n: its[n] for n in shared}),
+        ("messages", _by_name(process.messages, " "), _by_name(lead.messages, " ")),
         ("configuration", _by_name(process.config, "="), _by_name(lead.config, "=")),
     ):
         names = [name for name in sorted({*mine, *theirs}) if mine.get(name) != theirs.get(name)]

@@ -11,10 +11,10 @@ from typing import Any, Final
 
 from quadriga.shared.config.sections import Config
 
-# Sections that are a computer's own: where it is reached, how it runs programs, where it writes.
-_OWN_SECTIONS: Final = ("bus", "runtime", "recorder")
-# What of them the whole team rests on: who waits for whom, and for how long.
-_AGREED: Final = ("bus.clock_timeout", "recorder.enabled")
+# Sections that are a computer's own: where it is reached, how it runs programs.
+_OWN_SECTIONS: Final = ("bus", "runtime")
+# What of them the whole team rests on: how long it waits.
+_AGREED: Final = ("bus.clock_timeout",)
 # Single keys that are a computer's own: a label, names of files (what is in these is part of the
 # predictor), where a robot hangs.
 _OWN: Final = (

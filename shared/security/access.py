@@ -21,17 +21,7 @@ from quadriga.shared import members
 from quadriga.shared.about import About, about_key
 from quadriga.shared.codec import MAX_BYTES, MAX_TEXT
 from quadriga.shared.config.sections import Config
-from quadriga.shared.members import (
-    AGENT,
-    DOCTOR,
-    LEADS,
-    OBSERVER,
-    RECORDER,
-    ROLES,
-    ROUTER,
-    Member,
-    Role,
-)
+from quadriga.shared.members import AGENT, DOCTOR, LEADS, OBSERVER, RECORDER, ROUTER, Member, Role
 from quadriga.shared.messages import Message
 from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.topics import CLOCK, ESTOP, RECEIVED, STATE, STATUS, TABLE, TRUTH, Topic
@@ -71,9 +61,7 @@ def team_identities(config: Config) -> tuple[Member, ...]:
         recorded=True,
         plant_each=config.team.plant_per_robot,
     )
-    foreign = {name for topic in TABLE for name in (*topic.senders, *topic.receivers)}
-    foreign -= {*_OTHERS, *(role.name for role in ROLES)}
-    return (*team, *(Member(name, Role(name, "")) for name in (*_OTHERS, *sorted(foreign))))
+    return (*team, *(Member(name, Role(name, "")) for name in _OTHERS))
 
 
 def identity_of(process: str) -> str:

@@ -148,11 +148,12 @@ def tls_files(certificates: str, process: str) -> TlsFiles:
     identity = identity_of(process)
     files = TlsFiles.within(Path(certificates).absolute() / identity)
     copy = f"`quadriga certs make` makes it; copy the folder {identity} to this machine"
-    for path in files:
-        if not path.is_file() or not path.stat().st_size:
-            got = "an empty file" if path.is_file() else "no such file"
-            raise ConfigError(str(path), got, f"that of {identity}", copy)
-    mode = files.key.stat().st_mode & 0o777
+    with name_file_errors(ConfigError, files.key.parent, "a folder that this user may enter"):
+        for path in files:
+            if not path.is_file() or not path.stat().st_size:
+                got = "an empty file" if path.is_file() else "no such file"
+                raise ConfigError(str(path), got, f"that of {identity}", copy)
+        mode = files.key.stat().st_mode & 0o777
     if mode & _OTHERS:
         cause = "others may read this private key"
         raise ConfigError(str(files.key), f"mode {mode:o}", "600", cause)

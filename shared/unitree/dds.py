@@ -286,7 +286,3 @@ class StructWriter:
     def readers(self) -> int:
         """How many readers there are."""
         return max(0, int(self._library.dds_get_matched_subscriptions(self._handle, None, 0)))
-
-    def close(self) -> None:
-        """Write no more, and have the readers know it; the participant stays."""
-        self._library.dds_delete(self._handle)

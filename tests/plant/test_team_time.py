@@ -68,19 +68,22 @@ def test_a_plant_is_silent_whose_newest_message_is_too_old(robot: str) -> None:
     assert time.end == (codes.PLANT_GONE, f"{silent} silent for 0.5 s; it slept")
 
 
-@pytest.mark.parametrize("robot", ["r1", "r2"])
 @pytest.mark.parametrize("heard", [True, False])
-def test_the_last_messages_of_a_plant_may_come_after_it_left(robot: str, heard: bool) -> None:
-    time, other = TeamTime(CONFIG, robot), "r2" if robot == "r1" else "r1"
+def test_the_announced_end_may_come_after_who_drives_time_has_left(heard: bool) -> None:
+    time = TeamTime(CONFIG, "r2")
     for _ in range(9):
-        time.look(EVERYBODY - {f"plant_{other}"}, 0, "")
+        time.look(EVERYBODY - {"plant_r1"}, 0, "")
     assert time.end is None
-    said = codes.COMMAND_LOST if robot == "r1" else codes.TIME_OVER
     if heard:
-        time.take(EVENT.key("team"), encode(Event.of(5, said, other, "")), 5)
-    time.look(EVERYBODY - {f"plant_{other}"}, 0, "")
-    assert time.end is not None
-    assert time.end == ((said, "") if heard else (codes.PLANT_GONE, f"plant_{other} gone"))
+        time.take(EVENT.key("team"), encode(Event.of(5, codes.TIME_OVER, "r1", "")), 5)
+    time.look(EVERYBODY - {"plant_r1"}, 0, "")
+    assert time.end == ((codes.TIME_OVER, "") if heard else (codes.PLANT_GONE, "plant_r1 gone"))
+
+
+def test_who_drives_time_ends_at_once_without_another_plant() -> None:
+    time = TeamTime(CONFIG, "r1")
+    time.look(EVERYBODY - {"plant_r3"}, 0, "")
+    assert time.end == (codes.PLANT_GONE, "plant_r3 gone")
 
 
 def test_the_plant_of_all_robots_depends_on_nobody() -> None:

@@ -113,8 +113,7 @@ OTHER = tuple(f"world.x{i}=1" for i in range(5))
         ({"version": "9", "config": ()}, BAD, "another version: 9, sim has 0.1.0"),
         ({"version": ""}, BAD, "another version: none, sim has 0.1.0"),
         (
-            # Topics of a plug-in, such as wind, need not be known to all.
-            {"messages": ("state 5c", "command 00", "wind 11")},
+            {"messages": ("state 5c", "command 00")},
             BAD,
             "another messages: command 00, sim has command 3f",
         ),
