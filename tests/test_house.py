@@ -25,7 +25,7 @@ BUDGETS: Final[Mapping[str, int]] = {
     "shared": 8_770,  # planned: 7,200; left: Unitree's protocols, the barrier, 640 lines of keys
     "quadriga": 39_735,  # planned: 18,200; left: harnesses of experiments, report, commands
     "benchmarks": 4_300,  # planned: 1,800
-    "tests": 45_700,  # planned: 28,000
+    "tests": 45_710,  # planned: 28,000
 }
 COUNTED: Final = (".py", ".js", ".css", ".html")
 MOST_ARGUMENTS: Final = 8
