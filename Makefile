@@ -50,7 +50,7 @@ test: prepared
 		--no-loadscope-reorder --max-worker-restart 0 $(ARGS)
 
 # One by one what keeps real time, needs a browser, networks of its own or the package index, types
-# what pages show, or takes long; some twenty minutes.
+# what pages show, or takes long.
 nightly: prepared
 	$(BIN)/python -m pytest -m nightly $(ARGS)
 
