@@ -87,7 +87,7 @@ class RobotPlant(Plant):
         self._foot_refresh = self._foot_changes = 0  # Hz in the busiest second; in this one
         self._foot_second = self._turned_at
         self._estops: Callable[[], str] = str  # why the team's was pressed, "" if it was not
-        self._untold = list[tuple[int, BridgeMode, str]]()  # when a mode began, ms, and why
+        self._announce: Callable[[Event], None] = lambda _event: None
         self._answers = Histogram(_ANSWER_BIN)  # from reports to the commands made of them, ms
         self._in_charge = False  # of the robot's motors
         self._watchdog_gone = False
@@ -185,8 +185,8 @@ class RobotPlant(Plant):
         self._in_charge = True
         self._stall()
 
-    def listen(self, estops: Callable[[], str]) -> None:
-        self._estops = estops
+    def listen(self, estops: Callable[[], str], announce: Callable[[Event], None]) -> None:
+        self._estops, self._announce = estops, announce
 
     def states(self) -> Mapping[str, State]:
         """What the robot measures; nothing at ticks at which it has not said anything new.
@@ -212,12 +212,10 @@ class RobotPlant(Plant):
         return {self._name: to_state(report, tick, self._yaw)}
 
     def step(self, commands: Mapping[str, Command]) -> Sequence[Event]:
-        """One millisecond of the walk; its first tells of the time before it, too."""
-        before = self._take_changes()
+        """One millisecond of the walk; what happens in it goes to whoever listens."""
         self.turn(Request.WALK, commands.get(self._name))
-        events = before + self._take_changes()
         self.tick += 1
-        return events
+        return ()
 
     def idle(self) -> None:
         """A millisecond of standing, while the others are waited for."""
@@ -261,13 +259,17 @@ class RobotPlant(Plant):
             if arrived is not None:
                 self._answers.add(1e3 * (self._clock() - arrived))
         changes = [*supervised.changes]
+        if inputs.estop and not changes and self.mode is BridgeMode.ESTOP:
+            changes = [(self.mode, self.supervision.reason)]  # who presses again waits for its word
         if self.now >= self._warn_at and self.mode is not BridgeMode.ESTOP:
             warning = self._supervisor.warning(report)
             self._warn_at = self.now + _WARN_MS[bool(warning)]
             changes += [(self.mode, warning)] if warning else []
         for mode, reason in changes:
-            self._say(f"{self._name}: {mode} {reason}".rstrip())
-            self._untold.append((self.now, mode, reason))
+            text = f"{mode} {reason}".rstrip()
+            self._say(f"{self._name}: {text}")
+            code = codes.ROBOT_STOPPED if mode is BridgeMode.ESTOP else codes.BRIDGE_MODE
+            self._announce(Event.of(self.tick, code, self._name, text))
         return supervised
 
     def finish(self) -> None:
@@ -329,17 +331,6 @@ class RobotPlant(Plant):
         """Milliseconds since this was asked last: more than one if the process stood still."""
         before, self._turned_at = self._turned_at, self._clock()
         return round(1000.0 * (self._turned_at - before))
-
-    def _take_changes(self) -> list[Event]:
-        """What the bridge has changed since the last call."""
-        events = []
-        for at, mode, reason in self._untold:
-            ms_ago, text = self.now - at, f"{mode} {reason}".rstrip()
-            text += f", {ms_ago / 1000:.1f} s before the walk" if ms_ago else ""
-            code = codes.ROBOT_STOPPED if mode is BridgeMode.ESTOP else codes.BRIDGE_MODE
-            events.append(Event.of(self.tick, code, self._name, text))
-        self._untold.clear()
-        return events
 
 
 def yaw_of(quat_wxyz: Array) -> float:

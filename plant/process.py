@@ -79,7 +79,7 @@ def run(
         server.requests = subscribe_requests(bus)
         if plant.is_robot:
             estops = subscribe_requests(bus)
-            plant.listen(lambda: estops().estop)
+            plant.listen(lambda: estops().estop, server.take_event)
         me = ProcessInfo(bus, config)
         if not join(bus, config, stopped, me):
             return

@@ -42,11 +42,11 @@ class Plant(Protocol):
         """Get the robots to stand, before the team walks; False if `stopped()` came first."""
         return not stopped()
 
-    def listen(self, estops: Callable[[], str]) -> None:
+    def listen(self, estops: Callable[[], str], announce: Callable[[Event], None]) -> None:
         """Ask `estops()` from now on why the team's emergency stop was pressed; "" if it was not.
 
-        Agents hear it, too. A robot must not depend on them. For plants that are no robots the
-        plant server sees to it.
+        Agents hear it too, but no robot may depend on them; for other plants the server sees to it.
+        What a robot does goes to `announce`, also while it stands up before the walk.
         """
         return
 

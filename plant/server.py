@@ -138,6 +138,12 @@ class PlantServer:
         """Publish an event of the present tick; a detail longer than a message's text is cut."""
         self._send(Event.of(self.plant.tick, code, robot, truncate_text(detail)))
 
+    def take_event(self, event: Event) -> None:
+        """Publish what has happened to the plant, and end the walk if it must."""
+        if event.robot or self.time.drives:  # what concerns all is announced once
+            self._send(event)
+        self._note_fall(event)
+
     def publish_status(self, status: Status) -> None:
         """Publish the plant's report on itself, with what its robots have to say."""
         self._put_status(encode(self.plant.describe(status)))
@@ -151,9 +157,7 @@ class PlantServer:
         if self._estopped >= 0:
             commands = {name: damp_joints(self.plant.tick) for name in self.plant.names}
         for event in self.plant.step(commands):
-            if event.robot or self.time.drives:  # what concerns all is announced once
-                self._send(event)
-            self._note_fall(event)
+            self.take_event(event)
         while self.time.falls:
             self._note_fall(self.time.falls.pop())
         if self.time.end is not None or not self.time.drives:

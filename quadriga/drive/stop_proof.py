@@ -22,6 +22,8 @@ def unconfirmed(
 ) -> list[str]:
     """Who has not said that it has stopped: robots' agents by name, and plants.
 
+    Before the walk, at tick 0, agents take nothing in yet; the word of a robot's plant is enough.
+
     Args:
         robots: of the team.
         statuses: the newest of each agent since the stop.
@@ -29,7 +31,8 @@ def unconfirmed(
         plant_each: whether each robot has a plant of its own.
     """
     names = tuple(robots)
-    agents = [n for n in names if n not in statuses or statuses[n].mode != ESTOP]
-    at_rest = {event.robot for event in events if event.code in _AT_REST}
+    at_rest = {event.robot: event.tick for event in events if event.code in _AT_REST}
+    walking = [name for name in names if at_rest.get(name) != 0]
+    agents = [n for n in walking if n not in statuses or statuses[n].mode != ESTOP]
     plants = names if plant_each else ("",)
     return agents + [f"{PLANT} {name}".rstrip() for name in plants if name not in at_rest]

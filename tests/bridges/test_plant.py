@@ -19,7 +19,7 @@ from quadriga.bridges.watchdog import Watchdog
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import CheckError
-from quadriga.shared.messages import Command, Status
+from quadriga.shared.messages import Command, Event, Status
 from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.unitree.codecs import A1
 from quadriga.shared.unitree.packets import OFF, SERVO, MotorTargets, RobotReport
@@ -107,11 +107,13 @@ def test_a_hot_motor_is_told_of_once_a_minute_and_recorded() -> None:
     driver: Any = SimpleNamespace(
         servo=SERVO, period_ms=1, receive=lambda: report, other_writers=lambda: 0
     )
-    plant = RobotPlant(config, "r1", driver, watchdog=None, say=said.append)
+    plant, events = RobotPlant(config, "r1", driver, watchdog=None, say=said.append), list[Event]()
+    plant.listen(str, events.append)
     for _ in range(3000):
         plant.turn(Request.REST)
-    assert said == ["r1: dry hot:FL_calf_joint 82 °C, 88 °C stop it"]
-    assert [reason for _, _, reason in plant._untold] == ["hot:FL_calf_joint 82 °C, 88 °C stop it"]
+    hot = "hot:FL_calf_joint 82 °C, 88 °C stop it"
+    assert said == [f"r1: dry {hot}"]
+    assert [(each.tick, each.robot, each.detail) for each in events] == [(0, "r1", f"dry {hot}")]
 
 
 def test_a_robot_that_is_not_as_it_must_be_gets_no_command() -> None:

@@ -157,6 +157,33 @@ def test_a_bridge_hears_the_emergency_stop_whatever_its_agent_does(
     assert "r1: estop estop:dog" in said.read_text(encoding="utf-8")
 
 
+@pytest.mark.nightly
+@pytest.mark.usefixtures("_realtime")
+@pytest.mark.usefixtures("robots")
+@pytest.mark.parametrize("config", ["a1"], indirect=True)
+def test_who_presses_the_emergency_stop_while_a_robot_stands_up_hears_that_it_is_damped(
+    file: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "run"
+    command = [
+        *QUADRIGA,
+        "walk",
+        "--config",
+        str(file),
+        "--out",
+        str(out),
+        "--armed",
+        "--no-report",
+    ]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as walking:
+        said = out / "logs" / "plant_r1.log"
+        await_true(lambda: said.is_file() and "standing-up" in said.read_text(encoding="utf-8"))
+        pressed = [*QUADRIGA, "estop", "--config", str(file)]
+        done = subprocess.run(pressed, capture_output=True, text=True, timeout=WAIT, check=False)
+        assert (done.returncode, "stopped r1" in done.stdout) == (0, True), done.stderr
+        assert walking.wait(WAIT) == 1
+
+
 @pytest.mark.parametrize("config", ["a1"], indirect=True)
 def test_a_robot_that_is_off_is_one_clear_error(file: Path, tmp_path: Path) -> None:
     done = walk(file, tmp_path / "run", "--armed")

@@ -34,3 +34,9 @@ def test_and_so_must_whoever_moves_the_motors() -> None:
     assert unconfirmed(ROBOTS, STOPPED, OF_ALL, plant_each=True) == ["plant r1", "plant r2"]
     one = [Event.of(5, ROBOT_STOPPED, "r2", "")]
     assert unconfirmed(ROBOTS, STOPPED, one, plant_each=True) == ["plant r1"]
+
+
+def test_before_the_walk_the_plant_of_a_robot_speaks_for_its_agent_too() -> None:
+    stopped = [Event.of(0, ROBOT_STOPPED, name, "") for name in ROBOTS]
+    assert not unconfirmed(ROBOTS, {}, stopped, plant_each=True)
+    assert unconfirmed(ROBOTS, {}, stopped[:1], plant_each=True) == ["r2", "plant r2"]
