@@ -57,9 +57,6 @@ class RobotPlant(Plant):
         now: ms since this was made.
         report: the robot's newest; None before the first.
         report_at: when it came, ms.
-
-    Raises:
-        ConfigError: `bridge.stop_buttons` names no buttons.
     """
 
     is_robot = True

@@ -492,7 +492,6 @@ class BridgeConfig:
     period_ms: int = number(
         0, "ms", 0, 2, "between two states, and two commands; 0: 1 for A1 and Go1, 2 for Go2"
     )
-    stop_buttons: str = text("L2+B", "buttons of the remote control that stop the robot")
     torque_share: float = number(0.9, "1", 0.05, 1.0, "share of a motor's greatest torque")
     torque_rate: float = number(8.0, "N·m/ms", 0.1, 100.0, "how fast that torque may change")
     speed_share: float = number(0.95, "1", 0.1, 1.5, "share of a joint's greatest speed")
@@ -501,9 +500,6 @@ class BridgeConfig:
     joint_margin: float = number(0.02, "rad", 0.0, 0.3, "distance kept from a joint's end stops")
     tilt_max: float = number(0.9, "rad", 0.1, 3.2, "tilt of the trunk at which the robot stops")
     battery_min: int = number(20, "%", 0, 100, "charge to stand up; at half it stops")
-    temperature_max: float = number(
-        0.0, "°C", 0.0, 120.0, "greatest of a motor to stand up; 8 °C more stop it; 0: the robot's"
-    )
     report_share: float = number(
         0.8, "1", 0.01, 1.0, "share of a second's packets that must come before it is commanded"
     )

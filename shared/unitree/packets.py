@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from quadriga.shared.errors import ConfigError, QuadrigaError
+from quadriga.shared.errors import QuadrigaError
 from quadriga.shared.robots.conventions import N_JOINTS, N_LEGS, Array
 
 SERVO: Final = 0x0A  # of A1 and Go1: the motor follows its command
@@ -126,19 +126,3 @@ def remote_bytes(buttons: frozenset[str] = frozenset()) -> bytes:
     """The 40 bytes of a remote control that is on while these buttons are down, sticks at rest."""
     bits = sum(1 << bit for bit, name in enumerate(BUTTONS) if name in buttons)
     return _KEYS.pack(_REMOTE_HEAD, bits).ljust(REMOTE_BYTES, b"\0")
-
-
-def parse_buttons(text: str, name: str) -> frozenset[str]:
-    """Buttons that are pressed together, as `L2+B`.
-
-    Args:
-        text: their names with `+` between them.
-        name: of the key that has the text, for the error.
-
-    Raises:
-        ConfigError: there is no such button.
-    """
-    buttons = frozenset(part.strip() for part in text.split("+"))
-    if buttons.difference(BUTTONS):
-        raise ConfigError(name, repr(text), f"buttons of {', '.join(BUTTONS)}, joined by +")
-    return buttons
