@@ -19,12 +19,12 @@ from quadriga.bridges.watchdog import Watchdog
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import CheckError
-from quadriga.shared.messages import Command, Status
+from quadriga.shared.messages import Command
 from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.unitree.codecs import A1
 from quadriga.shared.unitree.packets import OFF, SERVO, MotorTargets, RobotReport
 from quadriga.shared.unitree.udp import Address, UdpPort
-from tests.bridges.robots import config_of, real_go1_counts, standing, tilted
+from tests.bridges.robots import config_of, standing, tilted
 from tests.bridges.test_udp_driver import HOST, free_port
 
 
@@ -182,28 +182,6 @@ def test_states_have_even_ticks_and_each_sample_has_one() -> None:
     # At a sample without anything new the last report counts, unless it is old.
     assert ticks_of(k == 5 for k in range(25)) == [6, 10]
     assert ticks_of(k == 3 for k in range(25)) == [4]
-
-
-def test_how_often_the_counts_of_a_real_go1_change_is_reported(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    rows = iter(real_go1_counts())
-
-    class Go1(Script):
-        def receive(self) -> RobotReport | None:
-            report = super().receive()
-            return report and replace(report, foot=next(rows))
-
-    script = Go1(iter([True, False] * 1100))
-    monkeypatch.setattr("quadriga.bridges.plant.monotonic", lambda: script.ms * 1e-3)
-    plant = RobotPlant(config_of("go1"), "r1", script, watchdog=None, say=print)
-    with suppress(StopIteration):
-        while True:
-            plant.states()
-            script.pass_ms()
-            plant.step({})
-    counters = plant.describe(Status(0, 0, "", "", "", {}, {}, np.empty(0), np.empty(0))).counters
-    assert counters["foot_refresh_hz"] in (49, 50, 51)
 
 
 def test_headings_count_from_where_the_robot_starts() -> None:
