@@ -104,9 +104,9 @@ manual: $(MANUAL)
 	$(BIN)/python -m sphinx --builder html --quiet --fail-on-warning docs docs/_build
 	@echo "the manual: docs/_build/index.html"
 
-# Whether the links of README and manual to elsewhere lead anywhere; it needs the internet.
-links: $(STAMP)
-	$(BIN)/python -m tests.manual.links
+# Whether the links of the manual to elsewhere lead anywhere; it needs the internet.
+links: $(MANUAL)
+	$(BIN)/python -m sphinx -q -b linkcheck docs docs/_build/links
 
 # A clip of each scenario, from real walks; about twenty minutes, and more for each team that has not
 # walked here before. ARGS=NAME … draws some of them.
