@@ -10,9 +10,15 @@ import pytest
 
 from quadriga.shared.errors import QuadrigaError
 from quadriga.shared.runtime.places import SOURCE
-from tests.manual.blocks import Block, all_blocks, find_spans, find_texts, list_pages
+from tests.manual.blocks import (
+    Block,
+    all_blocks,
+    find_spans,
+    find_texts,
+    list_pages,
+    split_commands,
+)
 from tests.manual.programs import check_command, check_mention, check_places, is_place
-from tests.manual.shell import split_commands
 
 OURS = ("quadriga ", "make ", "python -m ")
 BLOCKS = [block for block in all_blocks() if block.language == "sh"]
