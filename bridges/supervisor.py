@@ -35,10 +35,9 @@ from quadriga.shared.robots.conventions import JOINT_NAMES, N_JOINTS, N_LEGS, Ar
 from quadriga.shared.robots.motions import Motion, posture_at, way_down, way_up
 from quadriga.shared.robots.spec import RobotSpec
 from quadriga.shared.runtime.record import record
-from quadriga.shared.unitree.packets import PROTECTED, MotorTargets, RobotReport, pressed_buttons
+from quadriga.shared.unitree.packets import PROTECTED, MotorTargets, RobotReport, asks_to_stop
 
 TRACKING_ERROR: Final = "tracking-error"  # why a test of joints is stopped
-STOP_BUTTONS: Final = frozenset(("L2", "B"))  # of the remote control, pressed together
 _HOTTER: Final = 8.0  # °C above `temperature_max` that stop a robot: its motors end at 10 more
 _RELEASING: Final = 1.0  # s, for which a robot that has lain down is damped
 
@@ -246,7 +245,7 @@ class Supervisor:
         config, report, mode = self._config, inputs.report, state.mode
         if inputs.estop:
             return with_detail("estop", inputs.estop)
-        if pressed_buttons(report.remote) >= STOP_BUTTONS:
+        if asks_to_stop(report.remote):
             return with_detail("remote", "L2+B")
         # Once the watchdog has damped the motors, it is who else has commanded them.
         if inputs.stall > config.damp_ms and mode is not BridgeMode.PASSIVE:

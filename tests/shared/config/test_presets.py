@@ -24,17 +24,6 @@ def test_a_preset_sets_its_keys_and_leaves_the_others(section: str, name: str) -
     assert asdict(found) == asdict(Config()) | {section: expected}
 
 
-def test_the_plain_setting_is_without_what_the_robust_one_adds() -> None:
-    """Scheduled contacts, no integrators, and the paper's weights of the QP."""
-    plain = load(None, {"controller.preset": "plain"}).controller
-    assert not plain.contact_detection
-    assert plain.ki_z == plain.ki_xy == 0.0
-    assert not any((plain.reject_side_contacts, plain.track_sinking_trunk, plain.flight))
-    assert plain.tilt_length == plain.swing_weight == 1.0
-    assert plain.reflex_ms == plain.swing_delay == plain.slip_speed == 0
-    assert (plain.gamma_tau, plain.gamma_force, plain.gamma_defect) == (1e2, 1e3, 1e6)
-
-
 def test_the_papers_planner_has_its_weights_and_nothing_that_it_does_not_name() -> None:
     """Fawcett et al., section V.B: Q, R, horizons, 40 ms; U is the friction cone alone."""
     paper = load(None, {"planner.preset": "paper", "identification.preset": "paper"})
@@ -49,11 +38,3 @@ def test_the_papers_planner_has_its_weights_and_nothing_that_it_does_not_name() 
     assert min(planner.deviation_max) > 10 * paper.robot.weight
     assert min(planner.trust_range) > 1e3
     assert paper.identification.predictor == "pinv"
-
-
-def test_a_fast_planner_holds_peers_plans_as_long_as_the_usual_one() -> None:
-    usual, fast = Config().planner, load(None, {"planner.preset": "fast"}).planner
-    assert fast.applied < usual.applied
-    assert fast.latency_ms <= 10 * fast.applied
-    for name in ("max_peer_age", "hold_steps"):
-        assert getattr(fast, name) * fast.applied == getattr(usual, name) * usual.applied
