@@ -15,8 +15,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
@@ -30,8 +29,6 @@ from quadriga.shared.runtime.signals import interrupt_on_sigterm
 TOP: Final = Path(__file__).parents[2]
 PROJECT: Final = "quadriga-test"
 IMAGE: Final = "quadriga:test"  # not the user's own
-_LABEL: Final = "com.docker.compose"
-_LAST: Final = 2000  # characters of what a command that failed has said
 ROBOTS: Final = 2
 KILLED: Final = "r2"
 SERVICES: Final = ("router", "doctor", "recorder", "sim", "r1", "r2", "operator")
@@ -48,41 +45,26 @@ duration = {seconds}
 [identification]
 seconds = 60.0
 """
+# What runs containers: its command, and the one that reads docker-compose.yml.
+ENGINES: Final = {"docker": ("docker", "compose"), "podman": ("podman-compose",)}
 _PATIENCE: Final = 240.0  # s, far more than any step takes on a busy machine
 _LOOK: Final = 2.0  # s; each look starts processes beside those that walk, so few look at once
+_LAST: Final = 2000  # characters of what a command that failed has said
 _BEGUN = monotonic()
 
 
-@dataclass(frozen=True, slots=True)
-class Engine:
-    """What runs containers.
-
-    Attributes:
-        name: its command.
-        compose: the command that reads docker-compose.yml.
-    """
-
-    name: str
-    compose: tuple[str, ...]
+class Failure(Exception):
+    """Something was not as it should be."""
 
 
-ENGINES: Final = (Engine("docker", ("docker", "compose")), Engine("podman", ("podman-compose",)))
-
-
-def find_engine() -> Engine | None:
-    """The first engine that runs here and has its Compose."""
-    for engine in ENGINES:
-        if shutil.which(engine.name) and shutil.which(engine.compose[0]):
-            asked = ([engine.name, "info"], [*engine.compose, "version"])
-            if all(
-                subprocess.run(c, capture_output=True, check=False).returncode == 0 for c in asked
-            ):
+def find_engine() -> str:
+    """The first engine that runs here and has its Compose; "" if there is none."""
+    for engine, compose in ENGINES.items():
+        if shutil.which(engine) and shutil.which(compose[0]):
+            asked = ([engine, "info"], [*compose, "version"])
+            if all(subprocess.run(c, capture_output=True).returncode == 0 for c in asked):
                 return engine
-    return None
-
-
-class CommandError(Exception):
-    """An engine's command failed."""
+    return ""
 
 
 class Containers:
@@ -93,7 +75,7 @@ class Containers:
         variables: what docker-compose.yml is told by the environment.
     """
 
-    def __init__(self, engine: Engine, variables: Mapping[str, str]) -> None:
+    def __init__(self, engine: str, variables: Mapping[str, str]) -> None:
         self._engine = engine
         self._environment = {**os.environ, "IMAGE": IMAGE, **variables}
         self._names: dict[str, str] = {}
@@ -105,121 +87,59 @@ class Containers:
         for name in ("BASE", "GL"):
             if given.get(name):
                 options += ["--build-arg", f"{name}={given[name]}"]
-        self._run("build", *options, "-t", IMAGE, "-f", "deploy/Dockerfile", ".", shown=True)
+        self.run("build", *options, "-t", IMAGE, "-f", "deploy/Dockerfile", ".")
 
-    def up(self, *services: str) -> None:
-        """Start services, and do not wait for them."""
-        self._compose("up", "-d", "--no-build", *services)
+    def compose(self, *words: str) -> None:
+        """Have Compose do something with the project."""
+        self._call([*ENGINES[self._engine], "-f", "docker-compose.yml", "-p", PROJECT, *words])
 
     def down(self) -> None:
         """Stop and remove all that this project has, and its image."""
-        self._compose("down", "-v", "-t", "30")
-        if self._run("images", "-q", IMAGE).strip():
-            self._run("rmi", IMAGE)
-
-    def left(self) -> list[str]:
-        """What is left of this project."""
-        mine = ("--filter", f"label={_LABEL}.project={PROJECT}")
-        kinds = (("ps", "-a", "-q"), ("volume", "ls", "-q"), ("network", "ls", "-q"))
-        return [line for kind in kinds for line in self._run(*kind, *mine).split()]
+        self.compose("down", "-v", "-t", "30")
+        if self.run("images", "-q", IMAGE).strip():
+            self.run("rmi", IMAGE)
 
     def is_healthy(self, service: str) -> bool:
         """Whether the engine finds a service healthy, by the check of docker-compose.yml."""
         name = self.container(service)
-        if self._engine.name == "docker":
-            return self._run("inspect", "-f", "{{.State.Health.Status}}", name).strip() == "healthy"
+        if self._engine == "docker":
+            return self.run("inspect", "-f", "{{.State.Health.Status}}", name).strip() == "healthy"
         command = ["podman", "healthcheck", "run", name]  # no systemd need run its timers
         return subprocess.run(command, capture_output=True, check=False).returncode == 0
 
-    def health(self, service: str) -> str:
-        """What the check of a service that runs says."""
-        command = [self._engine.name, "exec", self.container(service), "healthy", service]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-        return (done.stdout + done.stderr).strip()
-
-    def status(self, service: str) -> int:
-        """The last exit status of a service's container."""
-        return int(self._run("inspect", "-f", "{{.State.ExitCode}}", self.container(service)))
-
-    def kill(self, service: str) -> None:
-        """Have a service's container vanish without a word."""
-        self._run("kill", "--signal", "KILL", self.container(service))
-
     def log(self, service: str) -> str:
         """What a service has said."""
-        done = subprocess.run(
-            [self._engine.name, "logs", self.container(service)],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            check=False,
-        )
-        return done.stdout
-
-    def copy(self, service: str, source: str, target: Path) -> None:
-        """Copy a folder's content out of a service's container."""
-        self._run("cp", f"{self.container(service)}:{source}/.", str(target))
-
-    def wait(self, service: str, timeout: float) -> None:
-        """Wait until a service's container has ended.
-
-        Raises:
-            CommandError: it runs still after `timeout` seconds.
-        """
-        self._call([self._engine.name, "wait", self.container(service)], timeout=timeout)
+        command = [self._engine, "logs", self.container(service)]
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
+        return subprocess.run(command, text=True, check=False, **pipes).stdout  # type: ignore[call-overload,no-any-return]
 
     def container(self, service: str) -> str:
         """The name of a service's container."""
         if service not in self._names:
-            self._names[service] = self._find(service)
+            labels = {"project": PROJECT, "service": service}
+            filters = [f"--filter=label=com.docker.compose.{k}={v}" for k, v in labels.items()]
+            found = self.run("ps", "-a", *filters, "--format", "{{.Names}}").split()
+            self._names[service] = found[0] if found else "none"
         return self._names[service]
 
-    def _find(self, service: str) -> str:
-        labels = {"project": PROJECT, "service": service}
-        filters = [
-            word
-            for key, value in labels.items()
-            for word in ("--filter", f"label={_LABEL}.{key}={value}")
-        ]
-        return self._run("ps", "-a", *filters, "--format", "{{.Names}}").split()[0]
-
-    def _compose(self, *words: str) -> str:
-        return self._call(
-            [*self._engine.compose, "-f", "docker-compose.yml", "-p", PROJECT, *words]
-        )
-
-    def _run(self, *words: str, shown: bool = False) -> str:
-        return self._call([self._engine.name, *words], shown=shown)
-
-    def _call(
-        self, command: list[str], *, shown: bool = False, timeout: float | None = None
-    ) -> str:
-        """Run a command in the top folder; what it says.
+    def run(self, *words: str, timeout: float | None = None) -> str:
+        """What a command of the engine says.
 
         Raises:
-            CommandError: it failed, or took longer than `timeout` seconds.
+            Failure: it failed, or took longer than `timeout` seconds.
         """
+        return self._call([self._engine, *words], timeout)
+
+    def _call(self, command: list[str], timeout: float | None = None) -> str:
+        options = {"cwd": TOP, "env": self._environment, "timeout": timeout}
         try:
-            done = subprocess.run(
-                command,
-                cwd=TOP,
-                env=self._environment,
-                stdout=sys.stderr if shown else subprocess.PIPE,
-                stderr=None if shown else subprocess.PIPE,
-                text=True,
-                check=False,
-                timeout=timeout,
-            )
+            done = subprocess.run(command, capture_output=True, text=True, check=False, **options)  # type: ignore[call-overload]
         except subprocess.TimeoutExpired:
-            raise CommandError(f"{shlex.join(command)}: not done after {timeout:g} s") from None
+            raise Failure(f"{shlex.join(command)}: not done after {timeout:g} s") from None
         if done.returncode:
-            said = f"{done.stdout or ''}{done.stderr or ''}"[-_LAST:]
-            raise CommandError(f"{shlex.join(command)}: exit status {done.returncode}\n{said}")
-        return done.stdout or ""
-
-
-class Failure(Exception):
-    """Something was not as it should be."""
+            said = f"{done.stdout}{done.stderr}"[-_LAST:]
+            raise Failure(f"{shlex.join(command)}: exit status {done.returncode}\n{said}")
+        return str(done.stdout)
 
 
 def say(text: str) -> None:
@@ -232,37 +152,27 @@ def expect(condition: bool, text: str) -> None:
         raise Failure(text)
 
 
-def wait_until(condition: Callable[[], str], what: str) -> None:
-    """Wait until `condition()` names nothing that is missing."""
-    deadline = monotonic() + _PATIENCE
-    while missing := condition():
-        expect(monotonic() < deadline, f"not {what} after {_PATIENCE:g} s: {missing}")
-        sleep(_LOOK)
-    say(what)
-
-
-def unwell(team: Containers) -> str:
-    """The first service that is not healthy, and why."""
-    found = next((name for name in SERVICES if not team.is_healthy(name)), None)
-    return f"{found}: {team.health(found)}" if found else ""
-
-
 def walk(team: Containers, folder: Path) -> None:
     """Walk in containers, kill an agent, and judge what was recorded."""
     team.build()
     say("image built")
-    team.up(*SERVICES)
+    team.compose("up", "-d", "--no-build", *SERVICES)
     say("certificates made, predictor fitted, all started")
-    wait_until(lambda: unwell(team), "all services are healthy")
-    team.kill(KILLED)
+    deadline = monotonic() + _PATIENCE
+    while unwell := [name for name in SERVICES if not team.is_healthy(name)]:
+        expect(monotonic() < deadline, f"not healthy after {_PATIENCE:g} s: {', '.join(unwell)}")
+        sleep(_LOOK)
+    say("all services are healthy")
+    team.run("kill", "--signal", "KILL", team.container(KILLED))
     for name in SERVICES:
         if name not in ("router", "doctor"):
-            team.wait(name, _PATIENCE)
+            team.run("wait", team.container(name), timeout=_PATIENCE)
     say("the walk is over, all have left")
     expect(f"{KILLED} gone" in team.log("sim"), team.log("sim"))
-    statuses = {name: team.status(name) for name in ("r1", "operator")}
-    expect(not any(statuses.values()), f"{statuses}")
-    team.copy("recorder", "/work/runs", folder)
+    for name in ("r1", "operator"):
+        status = team.run("inspect", "-f", "{{.State.ExitCode}}", team.container(name)).strip()
+        expect(status == "0", f"{name}: exit status {status}")
+    team.run("cp", f"{team.container('recorder')}:/work/runs/.", str(folder))
     judge(folder)
 
 
@@ -287,11 +197,9 @@ def main() -> int:
     arguments = parser.parse_args()
     interrupt_on_sigterm()  # whoever ends it leaves nothing behind either
     engine = find_engine()
-    if engine is None:
-        print(
-            "test-containers: neither Docker with Compose nor Podman with podman-compose runs here",
-            file=sys.stderr,
-        )
+    if not engine:
+        expected = "neither Docker with Compose nor Podman with podman-compose runs here"
+        print(f"test-containers: {expected}", file=sys.stderr)
         return 2
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -303,24 +211,14 @@ def main() -> int:
         try:
             walk(team, folder / "runs")
             status = 0
-        except (Failure, CommandError) as error:
+        except Failure as error:
             print(f"test-containers: {error}", file=sys.stderr)
-            _show_logs(team)
+            for service in SERVICES:
+                print(f"--- {service}\n{team.log(service)[-1500:]}", file=sys.stderr)
         finally:
             team.down()
-    if left := team.left():
-        print(f"test-containers: left behind: {', '.join(left)}", file=sys.stderr)
-        return 1
     say(f"all is taken down; {'passed' if status == 0 else 'failed'}")
     return status
-
-
-def _show_logs(team: Containers) -> None:
-    for service in SERVICES:
-        try:
-            print(f"--- {service}\n{team.log(service)[-1500:]}", file=sys.stderr)
-        except (CommandError, IndexError):
-            print(f"--- {service}: no container", file=sys.stderr)
 
 
 if __name__ == "__main__":
