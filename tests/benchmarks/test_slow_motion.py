@@ -10,24 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.slow_motion import SlowTime, in_slow_motion
-from quadriga.shared.runtime import clock
+from benchmarks.slow_motion import in_slow_motion
 from quadriga.team.launch import ProcessSpec
-
-
-def test_clocks_and_sleep_go_slower(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(clock, "time", SlowTime(0.25))
-    begun, wall, true = clock.monotonic_ns(), clock.wall_ns(), time.monotonic_ns()
-    clock.sleep(0.02)
-    took, went, really = (
-        clock.monotonic_ns() - begun,
-        clock.wall_ns() - wall,
-        time.monotonic_ns() - true,
-    )
-    assert really >= 80_000_000
-    assert took == pytest.approx(0.25 * really, rel=0.1)
-    assert went == pytest.approx(0.25 * really, rel=0.1)
-    assert clock.monotonic() == pytest.approx(0.25 * time.monotonic(), abs=0.1)
 
 
 def test_a_process_of_the_table_runs_by_them(tmp_path: Path) -> None:
