@@ -79,11 +79,6 @@ def find_blocks(text: str, page: str) -> list[Block]:
     return found
 
 
-def find_texts(text: str) -> list[str]:
-    """What stands in the blocks of a page's text that are said to be of no language."""
-    return [body for language, body in _ANY_FENCE.findall(text) if language in ("", "text")]
-
-
 def find_spans(text: str) -> list[str]:
     """What a page's prose shows as code, each on one line."""
     return [" ".join(span.split()) for span in _SPAN.findall(_ANY_FENCE.sub("", text))]

@@ -10,14 +10,7 @@ import pytest
 
 from quadriga.shared.errors import QuadrigaError
 from quadriga.shared.runtime.places import SOURCE
-from tests.manual.blocks import (
-    Block,
-    all_blocks,
-    find_spans,
-    find_texts,
-    list_pages,
-    split_commands,
-)
+from tests.manual.blocks import Block, all_blocks, find_spans, list_pages, split_commands
 from tests.manual.programs import check_command, check_mention, check_places, is_place
 
 OURS = ("quadriga ", "make ", "python -m ")
@@ -61,13 +54,6 @@ def wrong_mentions(text: str) -> Iterator[str]:
 def test_each_command_and_file_that_prose_mentions_is_there() -> None:
     wrong = {page.name: list(wrong_mentions(page.read_text("utf-8"))) for page in list_pages()}
     assert {name: lines for name, lines in wrong.items() if lines} == {}
-
-
-def test_commands_stand_in_blocks_that_say_so() -> None:
-    """A block of no language is not looked at by any of these tests."""
-    for page in list_pages():
-        for text in find_texts(page.read_text("utf-8")):
-            assert not [line for line in text.splitlines() if line.startswith(OURS)], page.name
 
 
 @pytest.mark.parametrize(
