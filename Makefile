@@ -9,7 +9,7 @@ MANUAL := $(VENV)/.manual
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 ARGS ?=
 
-.PHONY: install tools walk prepared test nightly test-containers image-lock lint fuzz endurance format docs dist pages manual links gallery figures clip acceptance bench bench-against bench-planner bench-recorder
+.PHONY: install tools walk prepared test nightly test-containers image-lock lint endurance format docs dist pages manual links gallery figures clip acceptance bench bench-against bench-planner bench-recorder
 
 install: $(STAMP)
 
@@ -71,10 +71,6 @@ image-lock: $(TOOLS)
 		--generate-hashes --no-annotate --custom-compile-command 'make image-lock' \
 		--python-version 3.11 --python-platform linux --only-binary :all: -o deploy/image.lock
 
-# A million damaged packets through the bridges of every kind of robot; some six minutes.
-fuzz: $(TOOLS)
-	$(BIN)/python -m tests.bridges.fuzz $(ARGS)
-
 # Half an hour of two robots in real time: does memory grow, is anything lost?
 endurance: $(STAMP)
 	$(BIN)/python -m benchmarks.endurance $(ARGS)
@@ -104,9 +100,9 @@ manual: $(MANUAL)
 	$(BIN)/python -m sphinx --builder html --quiet --fail-on-warning docs docs/_build
 	@echo "the manual: docs/_build/index.html"
 
-# Whether the links of README and manual to elsewhere lead anywhere; it needs the internet.
-links: $(STAMP)
-	$(BIN)/python -m tests.manual.links
+# Whether the links of the manual to elsewhere lead anywhere; it needs the internet.
+links: $(MANUAL)
+	$(BIN)/python -m sphinx -q -b linkcheck docs docs/_build/links
 
 # A clip of each scenario, from real walks; about twenty minutes, and more for each team that has not
 # walked here before. ARGS=NAME … draws some of them.

@@ -8,11 +8,10 @@ from typing import Final, NamedTuple
 import numpy as np
 import pinocchio
 
-from quadriga.bridges.limits import temperature_limits
 from quadriga.bridges.supervisor import tilt_of
 from quadriga.shared.config.sections import BridgeConfig
 from quadriga.shared.errors import CheckError
-from quadriga.shared.robots.conventions import FOOT_FRAMES, GRAVITY, JOINT_NAMES, Array
+from quadriga.shared.robots.conventions import FOOT_FRAMES, GRAVITY, JOINT_NAMES, N_LEGS, Array
 from quadriga.shared.robots.pinocchio_model import build_pinocchio_model
 from quadriga.shared.robots.spec import RobotSpec
 from quadriga.shared.unitree.packets import PROTECTED, RobotReport
@@ -77,7 +76,7 @@ def check_reports(
     if not finite:
         return findings
     findings += [_check_ticks(reports), _check_battery(last, config)]
-    findings += _check_motors(last, config, robot)
+    findings += _check_motors(last, robot)
     findings += [_check_angles(reports, robot), *_check_still(reports), *_check_gravity(reports)]
     return findings if hung else [*findings, _check_legs(last, robot)]
 
@@ -111,9 +110,9 @@ def _check_battery(report: RobotReport, config: BridgeConfig) -> Finding:
     return Finding("battery", charge, f"at least {config.battery_min} %", enough, "charge it")
 
 
-def _check_motors(report: RobotReport, config: BridgeConfig, robot: RobotSpec) -> list[Finding]:
+def _check_motors(report: RobotReport, robot: RobotSpec) -> list[Finding]:
     off = [JOINT_NAMES[k] for k in np.flatnonzero(report.mode == PROTECTED)]
-    limits = temperature_limits(config, robot)
+    limits = np.tile(robot.temperature_max, N_LEGS)
     hottest = int(np.argmax(report.temperature - limits))
     heat, limit = report.temperature[hottest], limits[hottest]
     cause, got = "switch the robot off and on again, let it cool", ", ".join(off) or "none"

@@ -30,7 +30,6 @@ from quadriga.shared.unitree.udp import Address, UdpPort, parse_address
 _ROBOT: Final = Address("192.168.123.10", 8007)
 _LISTEN: Final = {"a1": Address("", 8080), "go1": Address("", 8090)}
 _HALF: Final = 1 << 31  # of the counter's range: a tick is behind another if it is less than this
-_RESTARTED: Final = 100  # reports in a row with older ticks: the robot has been started again
 _ANSWER: Final = 4.0  # s, for the robot to be found and to answer a query
 _LETTING_GO: Final = 15.0  # s, for its controller to do what it is asked to
 _LOOK: Final = 0.01  # s
@@ -117,7 +116,6 @@ class UdpDriver(RobotDriver):
         self._codec: Codec = CODECS[kind]
         self._port = UdpPort(Address(listen.host, 0) if sends_only else listen, robot)
         self._tick: int | None = None
-        self._older = 0
 
     def receive(self) -> RobotReport | None:
         """The newest report; damaged, foreign, repeated and older ones are counted."""
@@ -136,10 +134,8 @@ class UdpDriver(RobotDriver):
             return False
         if ahead >= _HALF:
             self.counters["older"] += 1
-            self._older += 1
-            if self._older < _RESTARTED:
-                return False
-        self._tick, self._older = tick, 0
+            return False
+        self._tick = tick
         return True
 
     def introduce(self) -> None:

@@ -63,12 +63,6 @@ def joint_limits(config: BridgeConfig, robot: RobotSpec) -> JointLimits:
     )
 
 
-def temperature_limits(config: BridgeConfig, robot: RobotSpec) -> Array:
-    """Temperature of each motor above which a robot does not stand up, (12,), °C."""
-    own = np.tile(robot.temperature_max, 4)
-    return np.full(N_JOINTS, config.temperature_max) if config.temperature_max else own
-
-
 @compiled
 def _is_known(k: int, q: Array, dq: Array, limits: JointLimits) -> bool:
     """Whether a true sensor could say this of joint k."""

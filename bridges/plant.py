@@ -57,9 +57,6 @@ class RobotPlant(Plant):
         now: ms since this was made.
         report: the robot's newest; None before the first.
         report_at: when it came, ms.
-
-    Raises:
-        ConfigError: `bridge.stop_buttons` names no buttons.
     """
 
     is_robot = True
@@ -84,8 +81,6 @@ class RobotPlant(Plant):
         self.report: RobotReport | None = None
         self.report_at, self._arrived = -1, 0.0  # the same by the clock, s
         self._sent_at, self._warn_at = 0, 0
-        self._foot_refresh = self._foot_changes = 0  # Hz in the busiest second; in this one
-        self._foot_second = self._turned_at
         self._estops: Callable[[], str] = str  # why the team's was pressed, "" if it was not
         self._announce: Callable[[Event], None] = lambda _event: None
         self._answers = Histogram(_ANSWER_BIN)  # from reports to the commands made of them, ms
@@ -300,7 +295,6 @@ class RobotPlant(Plant):
         counters = {**status.counters, **self._driver.counters}
         counters |= {f"limited_{name}": count for name, count in self._cut.items()}
         if (report := self.report) is not None:
-            counters["foot_refresh_hz"] = self._foot_refresh
             counters["hottest_c"] = int(np.max(report.temperature))
             counters["motors_lost"] = int(np.sum(report.lost))
             if report.battery is not None:
@@ -319,12 +313,7 @@ class RobotPlant(Plant):
         report = self._driver.receive()
         if report is None:
             return False
-        before, now = self.report or report, self._clock()
-        if (seconds := now - self._foot_second) >= 1.0:
-            self._foot_refresh = max(self._foot_refresh, round(self._foot_changes / seconds))
-            self._foot_second, self._foot_changes = now, 0
-        self._foot_changes += not np.array_equal(report.foot, before.foot)
-        self.report, self.report_at, self._arrived = report, self.now, now
+        self.report, self.report_at, self._arrived = report, self.now, self._clock()
         return True
 
     def _stall(self) -> int:

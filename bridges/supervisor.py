@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from quadriga.bridges.limits import joint_limits, limit_targets, shares_of_speed, temperature_limits
+from quadriga.bridges.limits import joint_limits, limit_targets, shares_of_speed
 from quadriga.bridges.postures import (
     SINKING,
     TORQUE,
@@ -31,17 +31,11 @@ from quadriga.shared import modes
 from quadriga.shared.codes import with_detail
 from quadriga.shared.config.sections import BridgeConfig
 from quadriga.shared.messages import Command
-from quadriga.shared.robots.conventions import JOINT_NAMES, N_JOINTS, Array
+from quadriga.shared.robots.conventions import JOINT_NAMES, N_JOINTS, N_LEGS, Array
 from quadriga.shared.robots.motions import Motion, posture_at, way_down, way_up
 from quadriga.shared.robots.spec import RobotSpec
 from quadriga.shared.runtime.record import record
-from quadriga.shared.unitree.packets import (
-    PROTECTED,
-    MotorTargets,
-    RobotReport,
-    parse_buttons,
-    pressed_buttons,
-)
+from quadriga.shared.unitree.packets import PROTECTED, MotorTargets, RobotReport, asks_to_stop
 
 TRACKING_ERROR: Final = "tracking-error"  # why a test of joints is stopped
 _HOTTER: Final = 8.0  # °C above `temperature_max` that stop a robot: its motors end at 10 more
@@ -171,16 +165,12 @@ class Supervisor:
         robot: of this kind.
         config: the limits.
         servo: the motors' mode in which they follow commands.
-
-    Raises:
-        ConfigError: `bridge.stop_buttons` names no buttons.
     """
 
     def __init__(self, robot: RobotSpec, config: BridgeConfig, servo: int) -> None:
         self._robot, self._config, self._servo = robot, config, servo
-        self._stop_buttons = parse_buttons(config.stop_buttons, "bridge.stop_buttons")
         self._limits = joint_limits(config, robot)
-        self._warm = temperature_limits(config, robot)
+        self._warm = np.tile(robot.temperature_max, N_LEGS)
         self._gentle = self._limits._replace(torque=np.minimum(TORQUE, self._limits.torque))
         self._fastest = config.speed_share * np.tile(robot.speed, 4)
         # Compiled, or loaded, now and not in the first millisecond.
@@ -255,8 +245,8 @@ class Supervisor:
         config, report, mode = self._config, inputs.report, state.mode
         if inputs.estop:
             return with_detail("estop", inputs.estop)
-        if self._stop_buttons <= pressed_buttons(report.remote):
-            return with_detail("remote", config.stop_buttons)
+        if asks_to_stop(report.remote):
+            return with_detail("remote", "L2+B")
         # Once the watchdog has damped the motors, it is who else has commanded them.
         if inputs.stall > config.damp_ms and mode is not BridgeMode.PASSIVE:
             return with_detail("bridge-late", f"{inputs.stall} ms")

@@ -25,6 +25,8 @@ python_use_unqualified_type_names = True
 nitpicky = False
 highlight_language = "text"
 
+linkcheck_ignore = [r"https?://(127\.|localhost)"]  # what a process of a team serves
+
 html_theme = "furo"
 html_title = f"quadriga {version}"
 html_static_path = ["_static"]

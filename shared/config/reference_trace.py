@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -15,9 +14,9 @@ from quadriga.shared.errors import ConfigError, name_file_errors
 from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.places import scenario_folder
 
-COLUMNS: Final = ("t", "vx", "vy", "wz")
 ROW_END: Final = ";"  # where a trace stands in a configuration, in one line
 _KEY: Final = "reference.trace"
+_HEAD: Final = "t,vx,vy,wz"
 _STREAM: Final = 6  # of the seed
 
 
@@ -66,38 +65,35 @@ def inline_trace(name: str) -> str:
     """
     path = Path(name) if "/" in name else scenario_folder() / name
     with name_file_errors(ConfigError, f"{_KEY} {path}", "a file that can be read"):
-        rows = _split_rows(path.read_text(encoding="utf-8-sig"))  # as spreadsheets write it
-    _parse_values(f"{_KEY} {path}", rows)
-    return ROW_END.join(",".join(row) for row in rows)
+        text = path.read_text(encoding="utf-8-sig")  # as spreadsheets write it
+    lines = ["".join(line.split()) for line in text.splitlines()]
+    lines = [line for line in lines if line and not line.startswith("#")]
+    _parse_values(f"{_KEY} {path}", lines)
+    return ROW_END.join(lines)
 
 
 @lru_cache(maxsize=8)
 def _parse_trace(text: str, begin: float) -> Trace:
-    values = _parse_values(_KEY, _split_rows(text.replace(ROW_END, "\n")))
+    values = _parse_values(_KEY, text.split(ROW_END))
     values.setflags(write=False)
     return Trace(values[:, 0], values[:, 1:], begin)
 
 
-def _split_rows(text: str) -> list[list[str]]:
-    lines = (line for line in text.splitlines() if line.strip() and not line.startswith("#"))
-    return [[word.strip() for word in row] for row in csv.reader(lines)]
-
-
-def _parse_values(name: str, rows: list[list[str]]) -> Array:
-    """Checked lines t, vx, vy, wz."""
-    if not rows or tuple(rows[0]) != COLUMNS:
-        raise ConfigError(name, ",".join(rows[0]) if rows else "nothing", ",".join(COLUMNS))
+def _parse_values(name: str, lines: list[str]) -> Array:
+    """Checked lines t, vx, vy, wz; the first of `lines` names them."""
+    if not lines or lines[0] != _HEAD:
+        raise ConfigError(name, lines[0] if lines else "nothing", _HEAD)
     try:
-        values = np.array([[float(word) for word in row] for row in rows[1:]])
+        values = np.array([[float(word) for word in line.split(",")] for line in lines[1:]])
     except ValueError as error:
         raise ConfigError(name, str(error), "four numbers a line") from None
-    if values.ndim != 2 or values.shape[1] != len(COLUMNS) or len(values) < 2:
+    if values.ndim != 2 or values.shape[1] != 4 or len(values) < 2:
         raise ConfigError(name, f"numbers of shape {values.shape}", "at least two lines of four")
     t = values[:, 0]
     if not np.isfinite(values).all() or t[0] != 0.0 or (np.diff(t) <= 0.0).any():
         got = f"times from {t[0]:g} to {t[-1]:g}"
         raise ConfigError(name, got, "finite numbers, t rising from 0")
-    for column, key in zip(values[:, 1:].T, COLUMNS[1:], strict=True):
+    for column, key in zip(values[:, 1:].T, ("vx", "vy", "wz"), strict=True):
         limits = ReferenceConfig.__dataclass_fields__[key].metadata
         if column.min() < limits["low"] or column.max() > limits["high"]:
             expected = f"{limits['low']:g} … {limits['high']:g} {limits['unit']}"

@@ -25,7 +25,7 @@ def number(default: Any, unit: str, low: float, high: float, doc: str) -> Any:
 
     The default also says the type of all values; the unit is "-" or "1" of what has none.
     """
-    return _key(default, doc, unit=unit, low=low, high=high)
+    return key(default, doc, unit=unit, low=low, high=high)
 
 
 def choice(choices: tuple[str, ...], doc: str, more: str = "") -> Any:
@@ -33,20 +33,11 @@ def choice(choices: tuple[str, ...], doc: str, more: str = "") -> Any:
 
     With `more`, which says what else there may be, the check of the whole configuration decides.
     """
-    return _key(choices[0], doc, choices=choices, more=more)
+    return key(choices[0], doc, choices=choices, more=more)
 
 
-def text(default: str, doc: str) -> Any:
-    """A key that is any text of one line."""
-    return _key(default, doc)
-
-
-def flag(default: bool, doc: str) -> Any:
-    """A key that is true or false."""
-    return _key(default, doc)
-
-
-def _key(default: Any, doc: str, **meta: Any) -> Any:
+def key(default: Any, doc: str, **meta: Any) -> Any:
+    """A key that is any text of one line, or true or false, as its default is."""
     usual = {"unit": "-", "low": -inf, "high": inf, "choices": (), "more": ""}
     return field(default=default, metadata={"doc": doc, **usual, **meta})
 
@@ -55,13 +46,13 @@ def _key(default: Any, doc: str, **meta: Any) -> Any:
 class TeamConfig:
     """The robots of the team."""
 
-    name: str = text("team", "first part of every key; teams on one network need own names")
+    name: str = key("team", "first part of every key; teams on one network need own names")
     robots: int = number(3, "1", 1, 10, "number of robots r1 … rn")
     robot: str = choice(tuple(ROBOTS), "kind of all robots of the team")
     yokes: str = choice(("complete", "chain", "ring", "none"), "which pairs are yoked")
     spacing: float = number(0.9, "m", 0.6, 3.0, "distance between neighbours at the start")
-    alternate_phase: bool = flag(True, "every second robot trots half a gait period later")
-    auto_resume: bool = flag(
+    alternate_phase: bool = key(True, "every second robot trots half a gait period later")
+    auto_resume: bool = key(
         False,
         "robots that stand because an input was lost walk again once all have been whole for "
         "resume_after; false: only once the operator says so (quadriga resume)",
@@ -70,9 +61,9 @@ class TeamConfig:
     resume_after: float = number(
         1.0, "s", 0.2, 4.0, "how long all inputs must have been whole before a robot walks again"
     )
-    plant: str = text(SIMULATED, "mujoco; robots: real ones behind bridges; or a plug-in's kind")
-    plant_per_robot: bool = flag(False, "every robot has a plant of its own; false: one for all")
-    agent_command: str = text(
+    plant: str = key(SIMULATED, "mujoco; robots: real ones behind bridges; or a plug-in's kind")
+    plant_per_robot: bool = key(False, "every robot has a plant of its own; false: one for all")
+    agent_command: str = key(
         "",
         "command line of a program of one's own that is the agent of each robot, see "
         "docs/tutorials/own_controller.md; empty: the project's own agents",
@@ -89,16 +80,16 @@ class BusConfig:
     """How the processes reach each other over Zenoh."""
 
     mode: str = choice(("peer", "client"), "peer: processes connect directly; client: by a router")
-    endpoint: str = text(
+    endpoint: str = key(
         "tcp/127.0.0.1:7447",
         "where the sim server, or plant_r1, listens (peer) or the router is (client); off the "
         "loopback tls/HOST:PORT",
     )
-    listen: str = text("tcp/127.0.0.1:0", "peer: where all others listen; port 0: any free one")
-    certificates: str = text(
+    listen: str = key("tcp/127.0.0.1:0", "peer: where all others listen; port 0: any free one")
+    certificates: str = key(
         "certs", "tls/HOST:PORT: folder with a folder for each process, see docs/security.md"
     )
-    plaintext: bool = flag(
+    plaintext: bool = key(
         False, "permit others than tls off the loopback: whoever reaches them commands the robots"
     )
     barrier_timeout: float = number(60.0, "s", 0.1, 3600.0, "how long to wait for all processes")
@@ -114,7 +105,7 @@ class WorldConfig:
     mode: str = choice(("lockstep", "realtime"), "lockstep waits for all commands")
     seed: int = number(0, "-", 0, 2**31, "seed of terrain, noise and everything else random")
     duration: float = number(20.0, "s", 0.5, 3600.0, "world time to walk")
-    scenario: str = text("", "name of the scenario these keys come from: a label only")
+    scenario: str = key("", "name of the scenario these keys come from: a label only")
     initial_posture: str = choice(
         ("standing", "lying"), "how simulated robots begin; lying: on their feet with folded legs"
     )
@@ -128,18 +119,18 @@ class WorldConfig:
     stairs_run: float = number(0.3, "m", 0.1, 2.0, "terrain stairs: depth of a tread")
     stairs_count: int = number(8, "1", 1, 50, "terrain stairs: steps up, and down again")
     friction: float = number(0.8, "1", 0.05, 2.0, "friction coefficient of feet on ground")
-    friction_of: str = text("", "robots whose feet find another friction: 'r2:0.3,r3:0.5'")
-    leg_collisions: bool = flag(
+    friction_of: str = key("", "robots whose feet find another friction: 'r2:0.3,r3:0.5'")
+    leg_collisions: bool = key(
         True, "all links collide with ground and each other; false: only feet and trunks do"
     )
     payload: float = number(0.0, "kg", 0.0, 60.0, "load unknown to the agents")
-    payload_on: str = text(
+    payload_on: str = key(
         "team", "who carries it: 'team' in equal shares, names 'r1,r2', or with shares 'r1:6,r3:4'"
     )
     payload_scatter: float = number(
         0.0, "m", 0.0, 0.15, "how far a load may lie off the trunk's centre along x and y, seeded"
     )
-    push: str = text(
+    push: str = key(
         "",
         "pushes 'robot:force[N]:direction[deg]:start[s]:duration[s]' separated by commas; "
         "robot may be 'all'; direction 0 is forward, 90 is left",
@@ -148,18 +139,18 @@ class WorldConfig:
     push_spread: float = number(0.0, "1", 0.0, 1.0, "spread of push_force, seeded")
     push_every: float = number(3.0, "s", 0.1, 600.0, "time between two pushes, before the first")
     push_duration: float = number(0.2, "s", 1e-3, 10.0, "duration of each push of the series")
-    motor_strength: str = text(
+    motor_strength: str = key(
         "",
         "motors that weaken: 'robot:joint:start[s]:share' separated by commas; joint as FL_calf, "
         "calf or FL, either may be 'any', and what is left open is drawn from the seed; share of "
         "its torque that the motor still gives, 0.6 where none is said",
     )
-    faults: str = text(
+    faults: str = key(
         "",
         "faulty sensors and motors, 'robot/component kind start[s] [duration[s]]' separated by "
         "commas, as 'r2/imu stuck 4 2'; docs/world.md has the components and kinds",
     )
-    live_faults: bool = flag(False, "quadriga fault --live may make sensors and motors faulty")
+    live_faults: bool = key(False, "quadriga fault --live may make sensors and motors faulty")
     command_timeout: float = number(
         10.0, "s wall", 0.05, 60.0, "lockstep: a robot that is silent longer ends the walk"
     )
@@ -221,13 +212,13 @@ class MotorsConfig:
     """Motors and joints: what the world simulates, and what of it the low level's model has."""
 
     preset: str = choice(("realistic", "ideal"), "ideal: no friction, inertia, delay, heat")
-    torque_speed: bool = flag(True, "torque falls with the joint's speed, to zero at its limit")
+    torque_speed: bool = key(True, "torque falls with the joint's speed, to zero at its limit")
     friction: float = number(0.4, "N·m", 0.0, 0.8, "dry friction; it needs rotor_inertia = true")
     viscous_friction: float = number(0.04, "N·m·s/rad", 0.0, 1.0, "viscous friction of the joints")
-    rotor_inertia: bool = flag(True, "the rotors' inertia, as joints feel it behind the gears")
+    rotor_inertia: bool = key(True, "the rotors' inertia, as joints feel it behind the gears")
     bandwidth: float = number(100.0, "Hz", 0.0, 1e4, "corner of a motor's first-order lag; 0: none")
     delay_ms: int = number(2, "ms", 0, 50, "time from a command until the motors act on it")
-    hard_stops: bool = flag(True, "end stops give way by hardly anything; false: by hundredths")
+    hard_stops: bool = key(True, "end stops give way by hardly anything; false: by hundredths")
     heat_time: float = number(300.0, "s", 0.0, 1e5, "thermal time constant of motors; 0: no heat")
 
 
@@ -277,18 +268,18 @@ class ControllerConfig:
     kd_yaw: float = number(20.0, "1/s", 0.0, 1e3, "yaw rate")
     kp_swing: float = number(400.0, "1/s²", 0.0, 1e4, "swing foot")
     kd_swing: float = number(40.0, "1/s", 0.0, 1e3, "swing foot rate")
-    contact_detection: bool = flag(True, "early touchdown becomes stance, a lost foot descends")
+    contact_detection: bool = key(True, "early touchdown becomes stance, a lost foot descends")
     contact_force: float = number(4.0, "N", 0.5, 100.0, "load by a foot sensor that is contact")
     calibration_time: float = number(3.0, "s", 0.1, 1e4, "time constant of foot sensors' fit")
     descent_speed: float = number(0.8, "m/s", 0.0, 3.0, "speed of a descending stance foot")
-    reject_side_contacts: bool = flag(
+    reject_side_contacts: bool = key(
         True, "a foot stopped from the side is no contact, nor an early one that bears no load"
     )
     reflex_ms: int = number(10, "ms", 0, 100, "a stopped swing foot rises until free for this")
-    track_sinking_trunk: bool = flag(
+    track_sinking_trunk: bool = key(
         True, "a descending foot follows a sinking trunk; desired feet stay within reach"
     )
-    flight: bool = flag(True, "without contact the desired motion of the trunk is free fall")
+    flight: bool = key(True, "without contact the desired motion of the trunk is free fall")
     load_time: float = number(1.0, "s", 0.0, 100.0, "time constant of the external load; 0: none")
     swing_delay: float = number(0.0, "1", 0.0, 0.5, "share of swing in which a foot only rises")
     swing_height: float = number(0.09, "m", 0.01, 0.2, "apex above the higher foothold")
@@ -315,14 +306,14 @@ class PlannerConfig:
         "; ".join(f"{kind.name}: {kind.title}" for kind in BUILT_IN.values()),
         more="the name of a plug-in's",
     )
-    options: str = text("", "numbers of a plug-in's planner: name=number, with spaces between")
+    options: str = key("", "numbers of a plug-in's planner: name=number, with spaces between")
     cost: str = choice(
         ("own", "team"),
         "distributed: what each agent minimises over its own forces. own: its own cost (eq. 12); "
         "team: that of the whole team, with the new plan mixed with its last one: plans approach "
         "a central planner's whatever the coupling",
     )
-    compensation: bool = flag(True, "distributed: bring peers' plans forward by their age")
+    compensation: bool = key(True, "distributed: bring peers' plans forward by their age")
     damping: float = number(
         -1.0,
         "1",
@@ -409,7 +400,7 @@ class IdentificationConfig:
         "before it, with peers' forces by their net wrench; ridge: regularised, block-weighted; "
         "pinv: the paper's",
     )
-    response: str = text(
+    response: str = key(
         "",
         "predictor 'periodic': file responses.npz of a probe, instead of data: only in simulation; "
         "{robots} in it is how many there are",
@@ -438,7 +429,7 @@ class ReferenceConfig:
     wz: float = number(0.0, "rad/s", -1.0, 1.0, "yaw rate")
     height: float = number(0.26, "m", 0.2, 0.32, "trunk height above the ground")
     ramp: float = number(1.0, "s", 0.0, 20.0, "time from standing to full speed")
-    trace: str = text(
+    trace: str = key(
         "",
         "CSV with columns t [s], vx, vy, wz that replaces these three, over and over: a path with "
         "a '/', or a file beside the scenarios; its lines are stored here, separated by ';'",
@@ -456,7 +447,7 @@ class ReferenceConfig:
 class RecorderConfig:
     """The recording of all traffic."""
 
-    enabled: bool = flag(True, "the team waits for the recorder before it walks")
+    enabled: bool = key(True, "the team waits for the recorder before it walks")
 
 
 @dataclass(frozen=True, slots=True)
@@ -470,7 +461,7 @@ class RuntimeConfig:
         "-15, and takes the same precedence once it gets too little; QUADRIGA_PRIORITY of the "
         "environment overrides it",
     )
-    check_cpu: bool = flag(
+    check_cpu: bool = key(
         True,
         "realtime: refuse to begin on a computer that the agents' ticks alone would keep busier "
         "than it can be, as measured before",
@@ -481,18 +472,17 @@ class RuntimeConfig:
 class BridgeConfig:
     """How a bridge reaches its robot, and the limits that it keeps whatever an agent asks for."""
 
-    endpoint: str = text("", "A1, Go1: where the robot is, HOST:PORT; empty: 192.168.123.10:8007")
-    listen: str = text(
+    endpoint: str = key("", "A1, Go1: where the robot is, HOST:PORT; empty: 192.168.123.10:8007")
+    listen: str = key(
         "", "A1, Go1: where its packets arrive, HOST:PORT; empty: port 8080 (A1) or 8090 (Go1)"
     )
-    interface: str = text(
+    interface: str = key(
         "", "Go2: its network interface, such as eth0; {number}: of the robot; lo: simulated ones"
     )
     domain: int = number(0, "1", 0, 200, "Go2: number of its DDS domain; on lo that of r1")
     period_ms: int = number(
         0, "ms", 0, 2, "between two states, and two commands; 0: 1 for A1 and Go1, 2 for Go2"
     )
-    stop_buttons: str = text("L2+B", "buttons of the remote control that stop the robot")
     torque_share: float = number(0.9, "1", 0.05, 1.0, "share of a motor's greatest torque")
     torque_rate: float = number(8.0, "N·m/ms", 0.1, 100.0, "how fast that torque may change")
     speed_share: float = number(0.95, "1", 0.1, 1.5, "share of a joint's greatest speed")
@@ -501,9 +491,6 @@ class BridgeConfig:
     joint_margin: float = number(0.02, "rad", 0.0, 0.3, "distance kept from a joint's end stops")
     tilt_max: float = number(0.9, "rad", 0.1, 3.2, "tilt of the trunk at which the robot stops")
     battery_min: int = number(20, "%", 0, 100, "charge to stand up; at half it stops")
-    temperature_max: float = number(
-        0.0, "°C", 0.0, 120.0, "greatest of a motor to stand up; 8 °C more stop it; 0: the robot's"
-    )
     report_share: float = number(
         0.8, "1", 0.01, 1.0, "share of a second's packets that must come before it is commanded"
     )

@@ -4,7 +4,7 @@ A certificate's common name is the identity of its process. Whatever is not perm
 Seen from the router, what a process sends comes in (`ingress`) and what it hears goes out
 (`egress`).
 
-A message that is larger than any of its type is dropped before anybody decodes it. No key has a
+A message that is larger than any may be is dropped before anybody decodes it. No key has a
 rate: Zenoh's is the least time between two messages, without a burst, and what a slow link has held
 up comes at once. With ten times the rate of states up to one in 300 was dropped in real time.
 """
@@ -13,16 +13,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import fields
-from math import prod
 from typing import Any, Final, NamedTuple
 
 from quadriga.shared import members
-from quadriga.shared.about import About, about_key
-from quadriga.shared.codec import MAX_BYTES, MAX_TEXT
+from quadriga.shared.about import about_key
+from quadriga.shared.codec import MAX_BYTES
 from quadriga.shared.config.sections import Config
 from quadriga.shared.members import AGENT, DOCTOR, LEADS, OBSERVER, RECORDER, ROUTER, Member, Role
-from quadriga.shared.messages import Message
 from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.topics import CLOCK, ESTOP, RECEIVED, STATE, STATUS, TABLE, TRUTH, Topic
 
@@ -35,12 +32,6 @@ _HEARERS: Final = (RECORDER, OBSERVER, DOCTOR)  # they hear everything and say n
 _OF_LEAD: Final = (CLOCK, TRUTH)  # only who drives time knows
 
 _SPARE_SESSIONS: Final = 8  # for those who look on, and who has yet to be found dead
-# Greatest length of what has no fixed one, by its letter: samples, robots, yokes, plans, ticks.
-_LENGTHS: Final = {"N": 100, "n": 10, "k": 45, "P": 1000, "K": 10_000}
-# Bytes of a field's content, and of what stands beside it, its name aside.
-_SIZES: Final = {bool: 1, int: 9, float: 9, str: 4 * MAX_TEXT, list: 16_384, dict: 16_384}
-_FRAME: Final = 32
-_ANSWER: Final = 256  # bytes of a question whether all has arrived, and of the answer
 
 
 class Rights(NamedTuple):
@@ -100,7 +91,12 @@ def _names(who: Member, topic: Topic, robots: Sequence[str]) -> Sequence[str]:
 
 def router_rules(config: Config) -> dict[str, Any]:
     """Zenoh's settings of a team's router: who may send and hear what, and how much."""
-    return {"access_control": access_control(config), **capacity(config)}
+    return {
+        "access_control": access_control(config),
+        "transport/unicast/max_sessions": len(team_identities(config)) + _SPARE_SESSIONS,
+        "transport/unicast/max_links": 1,  # the rules do not see a second link of a session
+        "transport/link/rx/max_message_size": MAX_BYTES,
+    }
 
 
 def access_control(config: Config) -> dict[str, Any]:
@@ -146,35 +142,3 @@ def _rule(
         "permission": "allow",
         "key_exprs": list(keys),
     }
-
-
-def capacity(config: Config) -> dict[str, Any]:
-    """Zenoh's settings of a router that let nobody take more than its share."""
-    team, asked = config.team.name, ["query", "reply"]
-    limits = [
-        *((t.name, ["put"], t.key(team, "*"), largest(t.type)) for t in TABLE),
-        ("receipts", asked, f"{team}/*/{RECEIVED}", _ANSWER),
-        ("about", asked, about_key(team, "*"), largest(About)),
-    ]
-    return {
-        "low_pass_filter": [
-            {"id": name, "messages": of, "flows": _IN, "key_exprs": [key], "size_limit": limit}
-            for name, of, key, limit in limits
-        ],
-        "transport/unicast/max_sessions": len(team_identities(config)) + _SPARE_SESSIONS,
-        "transport/unicast/max_links": 1,  # the rules do not see a second link of a session
-        "transport/link/rx/max_message_size": MAX_BYTES,
-    }
-
-
-def largest(kind: type[Message]) -> int:
-    """Bytes that a message of a type takes at most."""
-    total = _FRAME
-    for item in fields(kind):
-        shape = item.metadata.get("shape")
-        if shape is None:
-            size = _SIZES[item.metadata["kind"]]
-        else:  # of a length that nobody knows as many as a message may have
-            size = 8 * prod(d if isinstance(d, int) else _LENGTHS.get(d, MAX_BYTES) for d in shape)
-        total += len(item.name) + _FRAME + size
-    return min(total, MAX_BYTES)

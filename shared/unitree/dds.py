@@ -11,7 +11,7 @@ import ctypes as c
 import importlib.util
 import zlib
 from pathlib import Path
-from typing import Any, Final, NamedTuple, Self
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -206,12 +206,6 @@ class DdsParticipant:
             if self._domain >= 0:
                 self.library.dds_delete(self._domain)
             self.handle = -1
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
 
 def _check(handle: int, what: str) -> int:

@@ -2,28 +2,20 @@
 
 from __future__ import annotations
 
-import struct
 from dataclasses import dataclass, field
-from functools import cache
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from quadriga.shared.errors import ConfigError, QuadrigaError
+from quadriga.shared.errors import QuadrigaError
 from quadriga.shared.robots.conventions import N_JOINTS, N_LEGS, Array
 
 SERVO: Final = 0x0A  # of A1 and Go1: the motor follows its command
 ON: Final = 0x01  # the same of the Go2
 OFF: Final = 0x00  # the motor brakes, and gives no torque of its own
 PROTECTED: Final = 0x08  # the motor has switched itself off: too hot, or too much current
-REMOTE_BYTES: Final = 40
-BUTTONS: Final = (  # of the remote control, by their bits
-    *("R1", "L1", "start", "select", "R2", "L2", "F1", "F2", "A", "B", "X", "Y"),
-    *("up", "right", "down", "left"),
-)
-_KEYS: Final = struct.Struct("<2sH")  # head and buttons; behind them are the sticks
-_REMOTE_HEAD: Final = b"\x55\x51"
+_STOP: Final = 1 << 5 | 1 << 9  # bits of L2 and B
 NO_ANGLE, NO_RATE = 2.146e9, 16000.0  # rad, rad/s: what Unitree writes where nothing is asked for
 
 # Where each of this project's joints and feet (FL FR RL RR) is in the robots' order (FR FL RR RL).
@@ -92,7 +84,7 @@ class RobotReport:
         temperature: of each motor, (12,), °C.
         lost: packets that each motor has missed, (12,); zeros of a robot that does not count them.
         imu_temperature: °C.
-        remote: of the remote control, 40 bytes, see `pressed_buttons`.
+        remote: of the remote control, 40 bytes, see `asks_to_stop`.
         battery: None of a robot that says nothing of it.
     """
 
@@ -108,37 +100,10 @@ class RobotReport:
     temperature: Array = field(default_factory=lambda: np.zeros(N_JOINTS))
     lost: NDArray[np.int64] = field(default_factory=lambda: np.zeros(N_JOINTS, dtype=np.int64))
     imu_temperature: int = 0
-    remote: bytes = bytes(REMOTE_BYTES)
+    remote: bytes = bytes(40)
     battery: Battery | None = None
 
 
-def pressed_buttons(remote: bytes) -> frozenset[str]:
-    """Names of the buttons that are down in the 40 bytes of a report, of `BUTTONS`."""
-    return _buttons_of(_KEYS.unpack_from(remote)[1])
-
-
-@cache
-def _buttons_of(keys: int) -> frozenset[str]:
-    return frozenset(name for bit, name in enumerate(BUTTONS) if keys >> bit & 1)
-
-
-def remote_bytes(buttons: frozenset[str] = frozenset()) -> bytes:
-    """The 40 bytes of a remote control that is on while these buttons are down, sticks at rest."""
-    bits = sum(1 << bit for bit, name in enumerate(BUTTONS) if name in buttons)
-    return _KEYS.pack(_REMOTE_HEAD, bits).ljust(REMOTE_BYTES, b"\0")
-
-
-def parse_buttons(text: str, name: str) -> frozenset[str]:
-    """Buttons that are pressed together, as `L2+B`.
-
-    Args:
-        text: their names with `+` between them.
-        name: of the key that has the text, for the error.
-
-    Raises:
-        ConfigError: there is no such button.
-    """
-    buttons = frozenset(part.strip() for part in text.split("+"))
-    if buttons.difference(BUTTONS):
-        raise ConfigError(name, repr(text), f"buttons of {', '.join(BUTTONS)}, joined by +")
-    return buttons
+def asks_to_stop(remote: bytes) -> bool:
+    """Whether L2 and B are down together in the 40 bytes of a report: head, buttons, sticks."""
+    return int.from_bytes(remote[2:4], "little") & _STOP == _STOP

@@ -99,12 +99,3 @@ def test_one_object_serves_every_tick() -> None:
         counts.append(active)
     assert min(counts) == 0
     assert max(counts) > 5
-
-
-def test_what_cannot_be_met_is_named() -> None:
-    stance = stance_of(1, 0)
-    impossible = replace(PLANNER, force_min=50.0, deviation_max=(20.0, 20.0, 5.0))
-    solver, nominal = PaperQp(impossible, response(1, 3)), nominal_forces(stance)
-    answer = solver.solve(np.zeros(6 * N), np.zeros(6 * N), stance, nominal)
-    assert answer.status == "primal infeasible"
-    assert np.isnan(answer.u).all()

@@ -86,15 +86,6 @@ def test_an_unknown_part_is_refused_by_name(tmp_path: Path) -> None:
     assert "no part wrold" in done.stderr
 
 
-@pytest.mark.nightly
-@pytest.mark.parametrize("part", ["planner", "fit"])
-def test_parts_can_be_run_by_themselves(part: str) -> None:
-    words = [sys.executable, "-m", f"benchmarks.{part}", "--help"]
-    done = subprocess.run(words, cwd=TOP, check=False, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    assert "--out" in done.stdout
-
-
 def test_an_interrupt_leaves_no_process_and_no_file(tmp_path: Path) -> None:
     words = command(tmp_path / "b.json", "bus")
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}

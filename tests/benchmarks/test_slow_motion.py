@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import inspect
 import os
-import re
 import subprocess
 import sys
 import time
@@ -12,30 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks import endurance
-from benchmarks.slow_motion import SlowTime, in_slow_motion
-from quadriga.shared.runtime import clock
+from benchmarks.slow_motion import in_slow_motion
 from quadriga.team.launch import ProcessSpec
-
-
-def test_clocks_and_sleep_go_slower(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(clock, "time", SlowTime(0.25))
-    begun, wall, true = clock.monotonic_ns(), clock.wall_ns(), time.monotonic_ns()
-    clock.sleep(0.02)
-    took, went, really = (
-        clock.monotonic_ns() - begun,
-        clock.wall_ns() - wall,
-        time.monotonic_ns() - true,
-    )
-    assert really >= 80_000_000
-    assert took == pytest.approx(0.25 * really, rel=0.1)
-    assert went == pytest.approx(0.25 * really, rel=0.1)
-    assert clock.monotonic() == pytest.approx(0.25 * time.monotonic(), abs=0.1)
-
-
-def test_all_that_the_project_asks_of_the_time_is_answered() -> None:
-    asked = set(re.findall(r"\btime\.(\w+)", inspect.getsource(clock)))
-    assert not [name for name in asked if not hasattr(SlowTime(1.0), name)]
 
 
 def test_a_process_of_the_table_runs_by_them(tmp_path: Path) -> None:
@@ -46,14 +22,3 @@ def test_a_process_of_the_table_runs_by_them(tmp_path: Path) -> None:
     variables = {**os.environ, "PYTHONPATH": path}
     done = subprocess.run(row.command, env=variables, capture_output=True, text=True, check=True)
     assert float(done.stdout) == pytest.approx(0.5 * time.monotonic(), abs=10.0)
-
-
-@pytest.mark.parametrize("speed", ["0", "1.5", "-1", "nan", "fast"])
-def test_a_speed_is_a_share(
-    speed: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(sys, "argv", ["endurance", "--speed", speed])
-    with pytest.raises(SystemExit) as ended:
-        endurance.main()
-    assert ended.value.code == 2
-    assert "--speed" in capsys.readouterr().err

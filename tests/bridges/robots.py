@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import json
+import struct
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ import numpy as np
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robots.conventions import GRAVITY, Array
-from quadriga.shared.unitree.packets import SERVO, Battery, MotorTargets, RobotReport, remote_bytes
+from quadriga.shared.unitree.packets import SERVO, Battery, MotorTargets, RobotReport
 
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
 
@@ -53,8 +54,9 @@ def tilted(angle: float) -> Any:
 
 
 def pressing(*buttons: str) -> bytes:
-    """What the remote control sends while these buttons are down."""
-    return remote_bytes(frozenset(buttons))
+    """What the remote control sends while these buttons are down, sticks at rest."""
+    bits = sum({"L2": 1 << 5, "B": 1 << 9, "up": 1 << 12}[button] for button in buttons)
+    return struct.pack("<2sH36x", b"\x55\x51", bits)
 
 
 def holding(config: Config, **fields: Any) -> MotorTargets:

@@ -1,100 +1,69 @@
-"""The plant of one robot, on real sockets, with a robot that answers by the millisecond."""
+"""The plant of one robot, with drivers that need no network."""
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
 
-from quadriga.bridges.drivers import RobotDriver, open_driver
-from quadriga.bridges.plant import RobotPlant, build_bridge, to_state, yaw_of
+from quadriga.bridges.drivers import RobotDriver
+from quadriga.bridges.plant import RobotPlant, to_state, yaw_of
+from quadriga.bridges.postures import passive
 from quadriga.bridges.supervisor import BridgeMode, Request
 from quadriga.bridges.watchdog import Watchdog
-from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import CheckError
-from quadriga.shared.messages import Command, Event, Status
+from quadriga.shared.messages import Command, Event
 from quadriga.shared.runtime.clock import sleep
-from quadriga.shared.unitree.codecs import A1
 from quadriga.shared.unitree.packets import OFF, SERVO, MotorTargets, RobotReport
-from quadriga.shared.unitree.udp import Address, UdpPort
-from tests.bridges.robots import config_of, real_go1_counts, standing, tilted
-from tests.bridges.test_udp_driver import HOST, free_port
+from tests.bridges.robots import config_of, standing, tilted
 
 
-class FakeRobot:
-    """Sends one and the same posture to whom it has heard, and keeps what it gets."""
+class Shy(RobotDriver):
+    """A robot of one posture that says nothing before it has had a packet, and keeps what it gets.
+
+    Every other time that it is asked it has something new to say.
+    """
+
+    servo, packets_ms = SERVO, 1
 
     def __init__(self, report: RobotReport) -> None:
-        here, listen = Address(HOST, free_port()), Address(HOST, free_port())
-        self._port = UdpPort(here)
-        self._listener: Address | None = None
-        self._report, self._over = report, threading.Event()
+        super().__init__()
+        self._report, self._asked = report, 0
         self.commands: list[MotorTargets] = []
-        self.keys = {
-            "team.robots": 1,
-            "team.plant": "robots",
-            "team.plant_per_robot": True,
-            "world.mode": "realtime",
-            "bridge.endpoint": f"{HOST}:{here.port}",
-            "bridge.listen": f"{HOST}:{listen.port}",
-            "bridge.report_share": 0.05,
-        }
-        self._thread = threading.Thread(target=self._run)
-        self._thread.start()
 
-    def _run(self) -> None:
-        tick = 0
-        while not self._over.is_set():
-            tick += 1
-            self._port.send(A1.encode_report(replace(self._report, tick=tick)), self._listener)
-            for packet, sender in self._port.drain():
-                self.commands.append(A1.decode_command(packet))
-                self._listener = sender
-            sleep(0.0003)  # rather too many than too few
+    def receive(self) -> RobotReport | None:
+        self._asked += 1
+        if not self.commands or self._asked % 2:
+            return None
+        self.counters["received"] += 1
+        return replace(self._report, tick=self._asked)
 
-    def close(self) -> None:
-        self._over.set()
-        self._thread.join()
-        self._port.close()
+    def introduce(self) -> None:
+        self.send(passive(np.zeros(12)))
+
+    def send(self, targets: MotorTargets) -> None:
+        self.commands.append(targets)
+
+    def close(self) -> None: ...
 
 
-@pytest.fixture
-def robot() -> Iterator[FakeRobot]:
-    made = FakeRobot(standing(config_of(), q=config_of().robot.q_lying))
-    yield made
-    made.close()
-
-
-@contextmanager
-def bridge_to(robot: FakeRobot, said: list[str], *, armed: bool = False) -> Iterator[RobotPlant]:
-    config = load(overrides=robot.keys)
-    driver = open_driver("a1", config.bridge)
-    watchdog = Watchdog("a1", config.bridge) if armed else None
-    plant = RobotPlant(config, "r1", driver, watchdog=watchdog, say=said.append)
-    try:
-        yield plant
-    finally:
-        plant.finish()
-
-
-def test_a_dry_run_enables_no_motor_whatever_the_agent_asks_for(robot: FakeRobot) -> None:
+def test_a_dry_run_enables_no_motor_whatever_the_agent_asks_for() -> None:
     """Its robot says nothing before it has had a packet: it gets one, and no other."""
-    said: list[str] = []
-    command = Command(0, 0, *np.full((5, 12), 3.0))
-    states = 0
-    with bridge_to(robot, said) as plant:
-        assert plant.prepare(lambda: False)
-        for _ in range(200):
-            states += len(plant.states())
-            plant.step({"r1": command})
-            sleep(0.001)
+    config, said, states = config_of(report_share=0.05), list[str](), 0
+    robot = Shy(standing(config, q=config.robot.q_lying))
+    plant = RobotPlant(config, "r1", robot, watchdog=None, say=said.append)
+    assert plant.prepare(lambda: False)
+    for _ in range(200):
+        states += len(plant.states())
+        plant.step({"r1": Command(0, 0, *np.full((5, 12), 3.0))})
+    plant.finish()
     assert [set(command.mode.tolist()) for command in robot.commands] == [{OFF}]
     assert plant.mode is BridgeMode.DRY
     assert states > 50
@@ -117,14 +86,13 @@ def test_a_hot_motor_is_told_of_once_a_minute_and_recorded() -> None:
 
 
 def test_a_robot_that_is_not_as_it_must_be_gets_no_command() -> None:
-    """This one reports that it lies on its back, and its bridge looks before its team is there."""
-    lying = standing(config_of(), quat_wxyz=tilted(3.1), accel=np.array([0.0, 0.0, -9.81]))
-    robot = FakeRobot(lying)
-    try:
-        with pytest.raises(CheckError, match=r"robot r1: posture: got tilted by 3\.10 rad"):
-            build_bridge(load(overrides=robot.keys), ("r1",), armed=True)
-    finally:
-        robot.close()
+    """This one reports that it lies on its back, and its bridge is armed."""
+    config = config_of(report_share=0.05)
+    robot = Shy(standing(config, quat_wxyz=tilted(3.1), accel=np.array([0.0, 0.0, -9.81])))
+    plant = RobotPlant(config, "r1", robot, watchdog=MagicMock(), say=print)
+    with pytest.raises(CheckError, match=r"robot r1: posture: got tilted by 3\.10 rad"):
+        plant.look(lambda: False)
+    plant.finish()
     assert [set(command.mode.tolist()) for command in robot.commands] == [{OFF}]
 
 
@@ -184,28 +152,6 @@ def test_states_have_even_ticks_and_each_sample_has_one() -> None:
     # At a sample without anything new the last report counts, unless it is old.
     assert ticks_of(k == 5 for k in range(25)) == [6, 10]
     assert ticks_of(k == 3 for k in range(25)) == [4]
-
-
-def test_how_often_the_counts_of_a_real_go1_change_is_reported(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    rows = iter(real_go1_counts())
-
-    class Go1(Script):
-        def receive(self) -> RobotReport | None:
-            report = super().receive()
-            return report and replace(report, foot=next(rows))
-
-    script = Go1(iter([True, False] * 1100))
-    monkeypatch.setattr("quadriga.bridges.plant.monotonic", lambda: script.ms * 1e-3)
-    plant = RobotPlant(config_of("go1"), "r1", script, watchdog=None, say=print)
-    with suppress(StopIteration):
-        while True:
-            plant.states()
-            script.pass_ms()
-            plant.step({})
-    counters = plant.describe(Status(0, 0, "", "", "", {}, {}, np.empty(0), np.empty(0))).counters
-    assert counters["foot_refresh_hz"] in (49, 50, 51)
 
 
 def test_headings_count_from_where_the_robot_starts() -> None:

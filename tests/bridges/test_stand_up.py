@@ -20,9 +20,8 @@ from tests.bridges.robots import holding
 
 
 class Moment(NamedTuple):
-    """One tick: the bridge's mode, height and vertical speed of the trunk, and its tilt."""
+    """One tick: height and vertical speed of the trunk, and its tilt."""
 
-    mode: BridgeMode
     height: float
     falling: float
     tilt: float
@@ -65,30 +64,16 @@ class Robot:
             self.world.step({} if command is None else {"r1": command})
             share = np.abs(self.world.motors.torque[0]) / self.config.robot.torque_limit
             self.torque = max(self.torque, float(share.max()))
-            physics = self.world.physics
-            quat = physics.qpos[3:7]
-            yield Moment(
-                self.state.mode, float(physics.qpos[2]), -float(physics.qvel[2]), tilt_of(quat)
-            )
-
-    def stand(self) -> list[Moment]:
-        return list(self.do(Request.STAND, BridgeMode.STAND))
-
-
-def random_angles(kind: str, seed: int) -> Array:
-    robot = ROBOTS[kind]
-    lower, upper = np.array(robot.lower) + 0.03, np.array(robot.upper) - 0.03
-    share = np.random.default_rng(seed).uniform(size=12)
-    angles: Array = lower + share * (upper - lower)
-    return angles
+            qpos, qvel = self.world.physics.qpos, self.world.physics.qvel
+            yield Moment(float(qpos[2]), -float(qvel[2]), tilt_of(qpos[3:7]))
 
 
 @pytest.mark.parametrize(("kind", "seed"), [("a1", 104), ("go1", 101), ("go2", 103)])
 def test_from_where_it_fell_it_stands_up_and_lies_down_gently(kind: str, seed: int) -> None:
-    robot = Robot(kind)
-    robot.drop(random_angles(kind, seed))
-    up = robot.stand()
-    spec = robot.config.robot
+    robot, spec = Robot(kind), ROBOTS[kind]
+    lower, upper = np.array(spec.lower) + 0.03, np.array(spec.upper) - 0.03
+    robot.drop(np.random.default_rng(seed).uniform(lower, upper))
+    up = list(robot.do(Request.STAND, BridgeMode.STAND))
     assert robot.state.reason == ""
     assert robot.torque <= 1.0
     assert up[-1].height == pytest.approx(spec.stand_height, rel=0.1)
@@ -101,7 +86,7 @@ def test_from_where_it_fell_it_stands_up_and_lies_down_gently(kind: str, seed: i
 
 def test_a_robot_that_stands_does_not_lie_down_to_stand_up() -> None:
     robot = Robot("a1")  # it spawns standing
-    heights = [moment.height for moment in robot.stand()]
+    heights = [moment.height for moment in robot.do(Request.STAND, BridgeMode.STAND)]
     assert min(heights) > 0.85 * robot.config.robot.stand_height
 
 

@@ -92,20 +92,12 @@ def test_a_robot_whose_packets_are_all_malformed_is_refused_with_their_reason(
         plant.look(lambda: False)
 
 
-def test_the_counter_may_wrap_and_a_restarted_robot_is_followed(link: Link) -> None:
+def test_the_counter_may_wrap(link: Link) -> None:
     for tick in (2**32 - 1, 0):
         link.report(tick)
         report = link.driver.receive()
         assert report is not None
         assert report.tick == tick
-    link.report(2**30)
-    assert link.driver.receive() is not None
-    ticks = []
-    for tick in range(150):
-        link.report(tick)
-        report = link.driver.receive()
-        ticks += [] if report is None else [report.tick]
-    assert ticks == list(range(99, 150))
 
 
 def test_what_is_sent_arrives_as_a_command(link: Link) -> None:

@@ -8,6 +8,8 @@ to each of its commands when it is run; `<!-- short: live -->`, of commands to a
 from __future__ import annotations
 
 import re
+import shlex
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -28,6 +30,9 @@ _FENCE: Final = re.compile(r"^```(sh|python)\n(.*?)^```$", re.MULTILINE | re.DOT
 _ANY_FENCE: Final = re.compile(r"^```(\S*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 _SPAN: Final = re.compile(r"`([^`]+)`")
 _SAID: Final = re.compile(r"<!-- (not run|short|excerpt):\s*(.*?)\s*-->\n+\Z")
+
+_SIGNS: Final = frozenset(";()<>|&")
+_ASSIGNMENT: Final = re.compile(r"[A-Za-z_]\w*=")
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,11 +79,6 @@ def find_blocks(text: str, page: str) -> list[Block]:
     return found
 
 
-def find_texts(text: str) -> list[str]:
-    """What stands in the blocks of a page's text that are said to be of no language."""
-    return [body for language, body in _ANY_FENCE.findall(text) if language in ("", "text")]
-
-
 def find_spans(text: str) -> list[str]:
     """What a page's prose shows as code, each on one line."""
     return [" ".join(span.split()) for span in _SPAN.findall(_ANY_FENCE.sub("", text))]
@@ -91,3 +91,40 @@ def all_blocks() -> list[Block]:
         text = path.read_text(encoding="utf-8")
         found += find_blocks(text, path.relative_to(SOURCE).as_posix())
     return found
+
+
+def split_commands(text: str) -> list[list[str]]:
+    """The words of each command, without redirections and without variables set for it.
+
+    What may fail, as `a` of `a || b` may, is left out.
+    """
+    lines = text.replace("\\\n", " ").splitlines()
+    return [command for line in lines for command in _split_line(line)]
+
+
+def _split_line(line: str) -> Iterator[list[str]]:
+    lexer = shlex.shlex(line, posix=True, punctuation_chars=True)
+    lexer.whitespace_split = True
+    words: list[str] = []
+    redirected = False
+    for token in lexer:
+        if redirected:  # the file that is read or written
+            redirected = False
+        elif not _SIGNS.issuperset(token):
+            words.append(token)
+        elif token in (">", ">>", "<", ">&"):
+            redirected = True
+            if words and words[-1].isdigit():
+                words.pop()
+        else:
+            if token != "||":
+                yield from _without_assignments(words)
+            words = []
+    yield from _without_assignments(words)
+
+
+def _without_assignments(words: list[str]) -> Iterator[list[str]]:
+    while words and _ASSIGNMENT.match(words[0]):
+        words = words[1:]
+    if words:
+        yield words

@@ -10,10 +10,8 @@ import pytest
 
 from quadriga.shared.errors import QuadrigaError
 from quadriga.shared.runtime.places import SOURCE
-from tests.manual.blocks import Block, all_blocks, find_spans, find_texts, list_pages
-from tests.manual.named import check_places, is_place
-from tests.manual.programs import check_command, check_mention
-from tests.manual.shell import split_commands
+from tests.manual.blocks import Block, all_blocks, find_spans, list_pages, split_commands
+from tests.manual.programs import check_command, check_mention, check_places, is_place
 
 OURS = ("quadriga ", "make ", "python -m ")
 BLOCKS = [block for block in all_blocks() if block.language == "sh"]
@@ -58,40 +56,20 @@ def test_each_command_and_file_that_prose_mentions_is_there() -> None:
     assert {name: lines for name, lines in wrong.items() if lines} == {}
 
 
-def test_what_prose_mentions_and_there_is_not_is_found() -> None:
-    text = "`quadriga walk --robts 3`, `quadriga wlak …`, `deploy/dekc.toml`, `quadriga info`"
-    assert len(list(wrong_mentions(text))) == 3
-
-
-def test_commands_stand_in_blocks_that_say_so() -> None:
-    """A block of no language is not looked at by any of these tests."""
-    for page in list_pages():
-        for text in find_texts(page.read_text("utf-8")):
-            assert not [line for line in text.splitlines() if line.startswith(OURS)], page.name
-
-
 @pytest.mark.parametrize(
     ("line", "error"),
     [
         ("quadriga wlak", "got 'wlak'"),
         ("quadriga walk --robts 3", "--robts"),
-        ("quadriga walk --robots 11", "team.robots: got 11"),
         (".venv/bin/quadriga walk --scenario gravle-3", "gravle-3"),
-        ("quadriga bridge --armed", ""),  # of which robot?
         ("quadriga campaign flat --planners 'a:planner.knd=none'", "planner.knd"),
-        ("quadriga campaign flta", "flta"),
         ("quadriga experiments hrad", "hrad"),
-        ("quadriga fault r2/imu stcuk --at 4", "stcuk"),
         ("quadriga walk --config deploy/dekc.toml", "no file deploy/dekc.toml"),
         ("pip install -e '.[campain]'", "no extra campain"),
         ("quadriga config | grpe seed", "grpe"),
         ("make wlak", "no target wlak"),
-        ("make walk ARGS='--robts 3'", "--robts"),
-        ("make lint ARGS=--fix", "no ARGS of lint"),
         ("python -m quadriga.nothing", ""),
         ("docker compose exec operator quadriga estp", "estp"),
-        ("docker compose exec oprator quadriga estop", "no service oprator"),
-        ("podman cp quadriga_recoder_1:/work/runs/. runs", "no service recoder"),
     ],
 )
 def test_a_command_that_there_is_not_is_found(line: str, error: str) -> None:
@@ -108,9 +86,3 @@ def test_what_programs_that_are_not_run_import_is_there() -> None:
             if isinstance(node, ast.ImportFrom):
                 module = import_module(str(node.module))
                 assert [one.name for one in node.names if not hasattr(module, one.name)] == []
-
-
-def test_what_is_not_run_says_why() -> None:
-    for block in all_blocks():
-        if block.marker == "not run":
-            assert len(block.said) > 4, block.name

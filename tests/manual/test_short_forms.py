@@ -1,9 +1,17 @@
-"""Every block of README and manual is run in a short form, or says why it is not."""
+"""Every block of README and manual is run in a short form, or says why it is not.
+
+One recorded run serves all commands that look into one, and one team those to a live one.
+"""
 
 from __future__ import annotations
 
 import shlex
+import signal
 import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from textwrap import indent
 from typing import Any, Final
@@ -11,11 +19,22 @@ from typing import Any, Final
 import pytest
 
 from quadriga.commands.parser import main
+from quadriga.identification.rollout import Rollout
+from quadriga.shared.config.sections import Config
 from quadriga.shared.runtime.places import SOURCE
+from quadriga.team.operator import references_of
 from tests.listening import WAIT, await_true
-from tests.manual.blocks import EXCERPT, LIVE, NOT_RUN, RUN_ELSEWHERE, SHORT, Block, all_blocks
-from tests.manual.shell import split_commands
-from tests.manual.short_forms import run_live, run_short, run_with
+from tests.manual.blocks import (
+    EXCERPT,
+    LIVE,
+    NOT_RUN,
+    RUN_ELSEWHERE,
+    SHORT,
+    Block,
+    all_blocks,
+    split_commands,
+)
+from tests.manual.programs import read_command
 
 RUN: Final = "RUN"  # what pages call a run folder
 CONFIG: Final = "team.toml"  # and the reader's configuration, here that by default
@@ -26,6 +45,100 @@ TYPED: Final = [b for b in BLOCKS if b.marker not in (NOT_RUN, EXCERPT) and b.sa
 LIVE_BLOCKS: Final = [block for block in BLOCKS if block.said == LIVE]
 PAGES: Final = sorted({block.page for block in TYPED})
 EXCERPTS: Final = [block for block in all_blocks() if block.marker == EXCERPT]
+_WALK: Final = ("walk", "--no-report", "--no-view", "--set", "runtime.priority=ordinary")
+# The team that `make prepared` collects for.
+_PREPARED: Final = ("--robots", "2", "--set", "identification.seconds=60", "--seconds", "2")
+_ALONE: Final = ("--robots", "1", "--planner", "none", "--seconds", "600")
+_LIMIT: Final = 120.0  # s, far more than a short walk takes on a busy machine
+WALKED: Final = 40  # ticks of a walk's short form
+_LIVE_ONCE: Final = frozenset(("top", "hz", "echo"))  # go on until the walk is over, without -n
+# Whose status tells how a team is, or what it did within seconds: a busy machine takes longer.
+_JUDGES: Final = frozenset(("status", "stop", "resume"))
+# Commands that are run as they are typed; the status of some tells what they found.
+_LOOKING: Final = "check doctor echo export hz info replay report resim whatif"
+_LISTING: Final = "completion config experiments fault scenarios version"
+_AS_TYPED: Final = frozenset((*_LOOKING.split(), *_LISTING.split(), "campaign", "certs"))
+_FINDS: Final = frozenset(("doctor", "replay"))
+
+
+@contextmanager
+def walking(folder: Path, *options: str) -> Iterator[subprocess.Popen[str]]:
+    """A team that is started and, should it still run, interrupted."""
+    words = (sys.executable, "-m", "quadriga", *_WALK, *options, "--out", str(folder))
+    log = folder.with_suffix(".log")
+    with log.open("w", encoding="utf-8") as output:
+        process = subprocess.Popen(words, stdout=output, stderr=subprocess.STDOUT, text=True)
+        try:
+            yield process
+        finally:
+            if process.poll() is None:
+                process.send_signal(signal.SIGINT)
+            process.wait(_LIMIT)
+
+
+@pytest.fixture(scope="session")
+def run_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The run folder of two seconds of two robots in lock-step."""
+    folder = tmp_path_factory.mktemp("manual") / "run"
+    with walking(folder, *_PREPARED) as process:
+        status = process.wait(_LIMIT)
+    assert status == 0, folder.with_suffix(".log").read_text(encoding="utf-8")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def live_team(tmp_path_factory: pytest.TempPathFactory) -> Iterator[subprocess.Popen[str]]:
+    """A robot that walks until somebody stops it."""
+    folder = tmp_path_factory.mktemp("live") / "run"
+    with walking(folder, *_ALONE) as process:
+        yield process
+
+
+def run_short(words: Sequence[str]) -> None:
+    """Run a command of `quadriga` in its short form, in the present folder.
+
+    Of a walk whose folder the page goes on with all is walked; of another some ticks.
+
+    Raises:
+        AssertionError: it has none, or it failed.
+    """
+    read = read_command(words)
+    if read is None:
+        return
+    command, config, _ = read
+    if command != "walk":
+        assert command in _AS_TYPED, f"{command} has no short form: say why it is not run"
+        _run(words, (0, 1) if command in _FINDS else (0,))
+    elif "--out" in words:
+        _walk(words)
+    else:
+        _walk_some_ticks(config)
+
+
+def run_live(words: Sequence[str]) -> None:
+    """Run a command to a team that walks; one that would go on until its end, once."""
+    once = ("-n", "1") if words[0] in _LIVE_ONCE and "-n" not in words else ()
+    _run([*words, *once], (0, 1) if words[0] in _JUDGES else (0,))
+
+
+def _walk_some_ticks(config: Config) -> None:
+    """Build the world of a walk and step its agents in it, without a planner."""
+    config = replace(config, planner=replace(config.planner, kind="none"))
+    rollout = Rollout(config, None, references_of(config))
+    for tick in rollout.ticks(WALKED):
+        assert tick.outputs.keys() == rollout.agents.keys()
+    assert rollout.world.tick == WALKED
+
+
+def _run(words: Sequence[str], statuses: Sequence[int]) -> None:
+    status = main(list(words))
+    assert status in statuses, f"quadriga {' '.join(words)}: status {status}"
+
+
+def _walk(words: Sequence[str]) -> None:
+    command = (sys.executable, "-m", "quadriga", *words, "--no-view")
+    done = subprocess.run(command, capture_output=True, text=True, timeout=_LIMIT, check=False)
+    assert done.returncode == 0, f"{done.stdout}{done.stderr}"
 
 
 def commands_of(block: Block) -> list[list[str]]:
@@ -56,7 +169,7 @@ def test_the_blocks_of_a_page_run(
             continue
         for words in commands_of(block):
             if block.marker == SHORT:
-                run_with(words, shlex.split(block.said))
+                _run([*words, *shlex.split(block.said)], (0,))
             else:
                 run_short(words)
 

@@ -14,9 +14,7 @@ from quadriga.certs.folder import CertificateFolder
 from quadriga.doctor.examine import examine
 from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.errors import BusError, ConfigError
-from quadriga.shared.security.access import largest
 from quadriga.shared.security.certificates import TlsFiles, tls_files
-from quadriga.shared.topics import COMMAND
 from tests.runtime.fortress import LONG_AGO, NOW, WAIT, Fortress, make_fortress, serving, stranger
 
 LAST = b"last"  # what comes in last over a link: the rest has come in before, or was refused
@@ -78,16 +76,6 @@ def test_who_is_let_in_hears_what_is_its_own_alone(fortress: Fortress, recorder:
         assert str(own.recv().key_expr) == "team/r2/state"
         samples = [sample for each in stolen for sample in iter(each.try_recv, None)]
         assert {str(sample.key_expr) for sample in samples} <= {"team/r2/state"}
-
-
-def test_a_message_larger_than_any_of_its_type_stops_at_the_router(
-    fortress: Fortress, recorder: Bus
-) -> None:
-    with stranger(fortress, fortress.files("r2")) as session:
-        session.put("team/r2/command", bytes(largest(COMMAND.type) + 1))
-        assert heard(fortress, recorder, session) == set()
-        session.put("team/r2/command", bytes(50))
-        assert heard(fortress, recorder, session) == {"team/r2/command"}
 
 
 def test_forged_presence_is_seen_by_nobody(fortress: Fortress, recorder: Bus) -> None:

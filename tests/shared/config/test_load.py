@@ -192,19 +192,9 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
         assert caught.value.name == str(path)
 
 
-@pytest.mark.parametrize(
-    ("text", "got"),
-    [
-        (".".join("a" * 50_000) + " = 1\n", "a key of more than 100 parts"),
-        ("[" + " . ".join(['"\\""', "'b'"] * 500) + "]\n", "a key of more than 100 parts"),
-        ("#" + "ä" * 2_500_000, "more than 4,194,304 bytes"),
-    ],
-)
-def test_a_file_that_would_take_the_memory_is_refused_before_it_is_parsed(
-    tmp_path: Path, text: str, got: str
-) -> None:
-    with pytest.raises(ConfigError, match=got):
-        load(write(tmp_path, text))
+def test_a_file_that_would_take_the_memory_is_refused_before_it_is_parsed(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="more than 4,194,304 bytes"):
+        load(write(tmp_path, "#" + "ä" * 2_500_000))
 
 
 @pytest.mark.parametrize(

@@ -13,18 +13,7 @@ import pytest
 
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.robots.a1 import A1
-from quadriga.shared.robots.conventions import (
-    FOOT_FRAMES,
-    GRAVITY,
-    JOINT_NAMES,
-    N_FORCES,
-    N_JOINTS,
-    N_LEGS,
-    N_OUTPUTS,
-    OUTPUTS,
-    Leg,
-    robot_names,
-)
+from quadriga.shared.robots.conventions import FOOT_FRAMES, JOINT_NAMES, N_JOINTS, Leg
 from quadriga.shared.robots.pinocchio_model import build_pinocchio_model
 from quadriga.shared.robots.registry import ROBOTS
 from quadriga.shared.robots.spec import RobotSpec
@@ -133,13 +122,6 @@ def test_the_nominal_pose_stands_at_its_height_within_the_joints_limits(robot: R
     assert not robot.q_stand.flags.writeable
     stretched = 2.0 * robot.geometry.link * np.cos(0.5 * robot.upper[2])
     assert stretched - 0.01 < robot.reach < stretched, "no farther than the knee's stop allows"
-
-
-def test_sizes_belong_together() -> None:
-    assert (len(Leg), len(JOINT_NAMES), 3 * len(Leg)) == (N_LEGS, N_JOINTS, N_FORCES)
-    assert len(OUTPUTS) == N_OUTPUTS
-    assert pytest.approx(-model_of("a1").gravity.linear[2]) == GRAVITY
-    assert robot_names(3) == ("r1", "r2", "r3")
 
 
 def test_a_description_that_is_missing_or_another_is_one_clear_error(

@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
 from typing import Any
 
-import numpy as np
 import pytest
 
-from quadriga.shared.codec import MAX_BYTES, encode
+from quadriga.shared.codec import MAX_BYTES
 from quadriga.shared.config.load import load
 from quadriga.shared.runtime.places import SOURCE
 from quadriga.shared.security.access import (
     Rights,
     access_control,
-    capacity,
     identity_of,
-    largest,
+    router_rules,
     team_identities,
     team_rights,
 )
-from quadriga.shared.topics import COMMAND, STATE, TABLE, Topic
 
 EACH = {"team.plant_per_robot": True, "world.mode": "realtime", "team.yokes": "none"}
 TWO = load(None, {"team.robots": 2})
@@ -75,12 +71,6 @@ def test_the_world_speaks_for_all_robots_and_the_plant_of_one_for_it_alone() -> 
     assert "team/r2/state" not in first
 
 
-def test_every_topic_has_somebody_who_may_send_it() -> None:
-    for found in (rights(), rights(**EACH)):
-        sent = {key for each in found.values() for key in each.publishes}
-        assert {topic.key("team", robot) for topic in TABLE for robot in ("r1", "r2")} <= sent
-
-
 def keys_of(block: dict[str, Any], identity: str, flow: str) -> set[str]:
     (names,) = [p["rules"] for p in block["policies"] if p["subjects"] == [identity]]
     own = [rule for rule in block["rules"] if rule["id"] in names and rule["flows"] == [flow]]
@@ -123,28 +113,8 @@ def test_everybody_who_may_be_on_the_bus_has_an_identity() -> None:
     assert (identity_of("echo-4711"), identity_of("plant_r1")) == ("observer", "plant_r1")
 
 
-LENGTHS = {"N": 100, "n": 10, "k": 45, "P": 1000, "K": 10_000}
-LARGEST: dict[type, Any] = {
-    **{int: 1 << 41, float: 1.0, bool: True, str: "ä" * 4096},
-    list: ("measurement:r10:4711",) * 500,
-    dict: {f"counter of something {k}": 1 << 41 for k in range(300)},
-}
-
-
-@pytest.mark.parametrize("topic", TABLE, ids=lambda topic: topic.name)
-def test_the_largest_message_of_a_type_fits(topic: Topic) -> None:
-    kind, values = topic.type, dict[str, Any]()
-    for item in fields(kind):
-        shape = item.metadata.get("shape")
-        sizes = [LENGTHS.get(d, d) for d in shape or ()]
-        values[item.name] = np.ones(sizes) if shape else LARGEST[item.metadata["kind"]]
-    limit = 2048 if topic in (STATE, COMMAND) else MAX_BYTES
-    assert len(encode(kind(**values))) <= largest(kind) <= limit
-
-
-def test_every_topic_has_a_size() -> None:
-    found = capacity(TWO)
-    sized = {key for rule in found["low_pass_filter"] for key in rule["key_exprs"]}
-    assert {topic.key("team", "*") for topic in TABLE} <= sized
+def test_nobody_takes_more_than_its_share_of_the_router() -> None:
+    found = router_rules(TWO)
+    assert found["transport/link/rx/max_message_size"] == MAX_BYTES
     assert found["transport/unicast/max_links"] == 1
     assert found["transport/unicast/max_sessions"] > len(team_identities(TWO))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -31,7 +32,7 @@ WAIT = 10.0  # s
 
 @pytest.fixture
 def participant() -> Iterator[DdsParticipant]:
-    with DdsParticipant(DOMAIN, "lo") as made:
+    with closing(DdsParticipant(DOMAIN, "lo")) as made:
         yield made
 
 
@@ -79,7 +80,7 @@ def test_what_is_written_is_read_to_the_byte(participant: DdsParticipant) -> Non
     sleep(0.05)  # a late process gets them all
     assert [reader.take() for _ in packets] == packets
     first = reader.writer
-    with DdsParticipant(DOMAIN, "lo") as other:
+    with closing(DdsParticipant(DOMAIN, "lo")) as other:
         foreign = StructWriter(other, LOW_COMMANDS)
         while witness.take() is None:
             assert monotonic() < deadline
