@@ -10,7 +10,7 @@ from quadriga.plant.lockstep import run_lockstep
 from quadriga.plant.pace import TeamPace
 from quadriga.plant.protocol import TOLD_TO_STOP, End, Plant
 from quadriga.plant.realtime import run_realtime
-from quadriga.plant.requests import subscribe_requests
+from quadriga.plant.requests import find_estop, subscribe_requests
 from quadriga.plant.server import PlantServer
 from quadriga.shared import codes
 from quadriga.shared.bus.discovery import ProcessInfo, await_agents, join, start_together
@@ -79,7 +79,7 @@ def run(
         server.requests = subscribe_requests(bus)
         if plant.is_robot:
             estops = subscribe_requests(bus)
-            plant.listen(lambda: estops().estop)
+            plant.listen(lambda: find_estop(estops()))
         me = ProcessInfo(bus, config)
         if not join(bus, config, stopped, me):
             return
