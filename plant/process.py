@@ -6,10 +6,8 @@ from collections.abc import Callable
 from contextlib import nullcontext
 from typing import Final
 
-from quadriga.plant.lockstep import run_lockstep
-from quadriga.plant.pace import TeamPace
+from quadriga.plant.loops import TeamPace, run_lockstep, run_realtime
 from quadriga.plant.protocol import TOLD_TO_STOP, End, Plant
-from quadriga.plant.realtime import run_realtime
 from quadriga.plant.requests import find_estop, subscribe_requests
 from quadriga.plant.server import PlantServer
 from quadriga.shared import codes
