@@ -15,6 +15,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from quadriga.agents.estimator.kinematics import rotation_matrix
 from quadriga.agents.estimator.rigid_body import foot_forces
 from quadriga.agents.plausibility import is_orientation
 from quadriga.shared.codes import with_detail
@@ -232,7 +233,7 @@ def _is_sound_attitude(memory: np.record, state: Array, dt: float) -> bool:
     if not (np.isfinite(np.sum(gyro)) and is_orientation(quat)):
         return False
     if 0.0 < np.max(np.abs(accel)) < _ACCEL_MAX:
-        memory.up += dt / (_UP_TIME + dt) * (np.sum(_vertical(quat) * accel) - memory.up)
+        memory.up += dt / (_UP_TIME + dt) * (np.sum(rotation_matrix(quat)[2] * accel) - memory.up)
     doubted = memory.missing[_IMU] > 0.0  # one that falls freely feels hardly anything
     if memory.up < (-_UP_LEAST if doubted else _UP_LEAST):
         return False
@@ -253,11 +254,4 @@ def _replace_imu(row: Array, valid: Array, attitude: bool) -> None:
     if attitude:
         row[_QUAT] = valid[_QUAT] / np.sqrt(np.sum(valid[_QUAT] * valid[_QUAT]))
         row[_GYRO] = 0.0
-    row[_ACCEL] = GRAVITY * _vertical(row[_QUAT])
-
-
-@compiled
-def _vertical(quat_wxyz: Array) -> Array:
-    """The vertical in the trunk's frame by an attitude, (3,)."""
-    w, x, y, z = quat_wxyz / np.sqrt(np.sum(quat_wxyz * quat_wxyz))
-    return np.array([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)])
+    row[_ACCEL] = GRAVITY * rotation_matrix(row[_QUAT])[2]
