@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from quadriga.agents.gait import step_ms
+from quadriga.agents.inbox import decode_packet
 from quadriga.agents.planner.solver import SOLVED
 from quadriga.agents.planner.team import TeamPlanner
 from quadriga.agents.planning.central import Central, CentralOutputs, CentralState
@@ -18,11 +19,10 @@ from quadriga.agents.rehearsal import rehearse_central
 from quadriga.shared.bus.discovery import ProcessInfo, join
 from quadriga.shared.bus.liveness import Liveness
 from quadriga.shared.bus.session import POLL, READY, Bus
-from quadriga.shared.codec import decode, encode
+from quadriga.shared.codec import encode
 from quadriga.shared.codes import code_of
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import PEER_TIMEOUT
-from quadriga.shared.errors import MessageError
 from quadriga.shared.members import PLANNER
 from quadriga.shared.messages import Event, Measurement, Reference, Status
 from quadriga.shared.robots.conventions import robot_names
@@ -120,10 +120,7 @@ class _CentralShell:
 
     def _take(self, key: str, payload: bytes) -> None:
         topic, robot = self._topics[key]
-        try:
-            message = decode(payload, topic.type)
-        except MessageError:
-            message = None
+        message = decode_packet(topic, payload)
         if isinstance(message, Measurement):
             self._measurements.append((robot, message))
             if message.tick > self._end:

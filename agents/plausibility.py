@@ -53,9 +53,10 @@ def _largest(array: Array) -> float:
     return float(np.maximum.reduce(np.abs(array), axis=None))
 
 
+@compiled
 def is_orientation(quat_wxyz: Array) -> bool:
     """Whether a quaternion, (4,), is near enough to unit length to be an orientation."""
-    return _QUAT_NORM2[0] < float(quat_wxyz @ quat_wxyz) < _QUAT_NORM2[1]
+    return bool(_QUAT_NORM2[0] < np.sum(quat_wxyz * quat_wxyz) < _QUAT_NORM2[1])
 
 
 def measured_limits(robot: RobotSpec) -> Array:

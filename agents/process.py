@@ -20,7 +20,6 @@ from quadriga.shared.runtime.clock import monotonic_ns, thread_ns
 from quadriga.shared.runtime.scheduling import count_cores, end_collection
 from quadriga.shared.runtime.signals import stop_on_signals
 
-_TICKS: Final = 200  # the last ones of a rehearsal: all that is loaded or compiled has been
 _TICK_MS: Final = 1.0  # what there is for a tick in real time
 
 
@@ -62,19 +61,20 @@ def rehearse_in_time(config: Config, agent: Agent) -> None:
     """Rehearse; in real time, with `runtime.check_cpu`, refuse a computer that cannot keep up.
 
     Of a walk in real time the agents are a part only. So a computer that is refused cannot keep up
-    for sure; one that is not may still be too slow. A first rehearsal may have compiled something,
-    so a second one decides.
+    for sure; one that is not may still be too slow. The first rehearsal may have compiled
+    something, so a second one is measured, in processor time: that of others does not count.
 
     Raises:
         ProcessError: the processor time of a tick is more than there is for it.
     """
-    cost_ms = _measure(config, agent)
+    rehearse(config, agent)
     if config.world.mode != "realtime" or not config.runtime.check_cpu:
         return
+    begun = thread_ns()
+    ticks = rehearse(config, agent).tick + 1
+    cost_ms = 1e-6 * (thread_ns() - begun) / ticks
     agents, cores = config.team.robots if is_loopback(config.bus.endpoint) else 1, count_cores()
     has_ms = _TICK_MS * min(1.0, cores / agents)  # a tick is one thread's work
-    if cost_ms > has_ms:
-        cost_ms = _measure(config, agent)
     if cost_ms > has_ms:
         shared = f"{agents} agents on {cores} cores" if agents > 1 else "one agent"
         raise ProcessError(
@@ -83,11 +83,3 @@ def rehearse_in_time(config: Config, agent: Agent) -> None:
             f"at most {has_ms:.2f} ms, of {shared}",
             "too slow a computer: --mode lockstep waits for it; runtime.check_cpu = false tries",
         )
-
-
-def _measure(config: Config, agent: Agent) -> float:
-    """Processor time of a tick in a rehearsal, ms; that of others does not count."""
-    ends: list[int] = []
-    rehearse(config, agent, lambda: ends.append(thread_ns()))
-    ticks = min(_TICKS, len(ends) - 1)
-    return 1e-6 * (ends[-1] - ends[-1 - ticks]) / ticks

@@ -5,7 +5,6 @@ First calls compile, load and allocate; they must not fall into the first steps 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Final
 
 import numpy as np
@@ -24,11 +23,10 @@ from quadriga.shared.topics import REFERENCE_EPOCH_MS, SAMPLE_MS
 _LEAN: Final = 0.8  # of the tilt that is a fall
 
 
-def rehearse(config: Config, agent: Agent, note: Callable[[], None] = lambda: None) -> AgentState:
+def rehearse(config: Config, agent: Agent) -> AgentState:
     """Step `agent` through standing, the first walking ticks and some planning steps.
 
-    What it takes in and what it commands goes over the wire's bytes. After each tick `note()` is
-    called.
+    What it takes in and what it commands goes over the wire's bytes.
 
     For the last two of them it leans, so far that limits of both its QPs are active. It leans some
     ticks earlier: an attitude that jumps is not believed at once.
@@ -41,7 +39,6 @@ def rehearse(config: Config, agent: Agent, note: Callable[[], None] = lambda: No
         inputs = Inputs(decode(sent, State), references=(_stay(config, tick),))
         memory, outputs = agent.step(memory, inputs)
         encode(outputs.command)
-        note()
     return memory
 
 

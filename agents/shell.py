@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Generic, Protocol, TypeVar
+from typing import Any, Protocol
 
 from quadriga.agents.inbox import Inbox, Source
 from quadriga.agents.modes import change_event
@@ -17,47 +17,31 @@ from quadriga.shared.codec import encode
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import PEER_TIMEOUT
 from quadriga.shared.messages import Message, State
-from quadriga.shared.modes import Mode
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns
 from quadriga.shared.runtime.scheduling import at_work
 from quadriga.shared.runtime.signals import interruptible
 from quadriga.shared.topics import AGENT_EVENT, COMMAND, INPUTS, MEASUREMENT, PLAN, STATUS, Topic
 
 
-class Remembered(Protocol):
-    """What the shell looks at of all that an agent remembers: its last tick, −1 before the first.
-
-    And what the robot is doing.
-    """
-
-    @property
-    def tick(self) -> int: ...
-
-    @property
-    def mode(self) -> Mode: ...
-
-
-S = TypeVar("S", bound=Remembered)
-
-
-class SteppedAgent(Protocol[S]):
+class SteppedAgent(Protocol):
     """Whatever answers the states of `robot`, tick by tick: `Agent`, or a user's own function.
 
-    `expected` is what lock-step waits for before the step of a tick.
+    `expected` is what lock-step waits for before the step of a tick. Of all that it remembers from
+    one step to the next the shell looks at the last `tick`, −1 before the first, and at the `mode`.
     """
 
     robot: str
 
-    def initial(self) -> S: ...
+    def initial(self) -> Any: ...
 
     def expected(self, tick: int) -> Expected: ...
 
-    def step(self, state: S, inputs: Inputs) -> tuple[S, Outputs]: ...
+    def step(self, state: Any, inputs: Inputs) -> tuple[Any, Outputs]: ...
 
 
 def answer_states(
     config: Config,
-    agent: SteppedAgent[S],
+    agent: SteppedAgent,
     inbox: Inbox,
     stopped: Callable[[], bool],
     rehearse: Callable[[], None],
@@ -92,10 +76,10 @@ def answer_states(
             shell.walk(stopped)
 
 
-class AgentShell(Generic[S]):
+class AgentShell:
     """The loop around an agent's `step`."""
 
-    def __init__(self, config: Config, agent: SteppedAgent[S], inbox: Inbox, bus: Bus) -> None:
+    def __init__(self, config: Config, agent: SteppedAgent, inbox: Inbox, bus: Bus) -> None:
         team, realtime = config.team.name, config.world.mode == "realtime"
         self._config, self._agent, self._inbox, self._bus = config, agent, inbox, bus
         self._lockstep = not realtime
@@ -128,7 +112,7 @@ class AgentShell(Generic[S]):
             for packet in self._bus.drain():
                 self._inbox.take(*packet)
 
-    def _answer(self, memory: S, state: State) -> S:
+    def _answer(self, memory: Any, state: State) -> Any:
         """One tick: wait for what is due, step, publish."""
         tick, begun = state.tick, monotonic_ns()
         self._telemetry.note_state(tick, begun)

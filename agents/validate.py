@@ -15,7 +15,9 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from quadriga.agents.estimator.kinematics import rotation_matrix
 from quadriga.agents.estimator.rigid_body import foot_forces
+from quadriga.agents.plausibility import is_orientation
 from quadriga.shared.codes import with_detail
 from quadriga.shared.config.sections import Config
 from quadriga.shared.messages import Command, State
@@ -40,7 +42,6 @@ _JUMP: Final = 0.1  # rad, of an angle or attitude against its rate, from one re
 _RETURN: Final = 0.5  # rad, from the last valid angle, within which one is valid again
 _FASTEST: Final = 20.0  # rad/s, of joints: where readings are missing, more may have happened
 _BEYOND: Final = 0.3  # rad beyond an end stop; encoders have an error of their zero
-_QUAT_NORM2: Final = (0.5, 2.0)  # |q|² of an attitude
 _ACCEL_MAX: Final = 150.0  # m/s²: accelerometers of such robots end at 16 g
 _UP_TIME: Final = 0.015  # s, time constant of the force that holds the trunk against gravity
 _UP_LEAST: Final = -6.0  # m/s²; a trunk that is thrown over is pulled down by less
@@ -229,14 +230,14 @@ def _is_sound_attitude(memory: np.record, state: Array, dt: float) -> bool:
     memory.same = memory.same + 1e3 * dt if same else 0.0
     if memory.same >= _SAME_MS and np.max(np.abs(gyro)) > _TURNS:
         return False
-    if not (np.isfinite(np.sum(gyro)) and _is_attitude(quat)):
+    if not (np.isfinite(np.sum(gyro)) and is_orientation(quat)):
         return False
     if 0.0 < np.max(np.abs(accel)) < _ACCEL_MAX:
-        memory.up += dt / (_UP_TIME + dt) * (np.sum(_vertical(quat) * accel) - memory.up)
+        memory.up += dt / (_UP_TIME + dt) * (np.sum(rotation_matrix(quat)[2] * accel) - memory.up)
     doubted = memory.missing[_IMU] > 0.0  # one that falls freely feels hardly anything
     if memory.up < (-_UP_LEAST if doubted else _UP_LEAST):
         return False
-    if dt > _PAUSE or not _is_attitude(last[_QUAT]):
+    if dt > _PAUSE or not is_orientation(last[_QUAT]):
         return dt > _PAUSE
     # Half the sine of the angle between what follows by the gyro and what is read.
     a, b, c = 0.25 * dt * (last[_GYRO] + gyro)
@@ -248,21 +249,9 @@ def _is_sound_attitude(memory: np.record, state: Array, dt: float) -> bool:
 
 
 @compiled
-def _is_attitude(quat_wxyz: Array) -> bool:
-    return bool(_QUAT_NORM2[0] < np.sum(quat_wxyz * quat_wxyz) < _QUAT_NORM2[1])
-
-
-@compiled
 def _replace_imu(row: Array, valid: Array, attitude: bool) -> None:
     """Let gravity alone act in a state, and put the last valid `attitude` into it, at rest."""
     if attitude:
         row[_QUAT] = valid[_QUAT] / np.sqrt(np.sum(valid[_QUAT] * valid[_QUAT]))
         row[_GYRO] = 0.0
-    row[_ACCEL] = GRAVITY * _vertical(row[_QUAT])
-
-
-@compiled
-def _vertical(quat_wxyz: Array) -> Array:
-    """The vertical in the trunk's frame by an attitude, (3,)."""
-    w, x, y, z = quat_wxyz / np.sqrt(np.sum(quat_wxyz * quat_wxyz))
-    return np.array([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)])
+    row[_ACCEL] = GRAVITY * rotation_matrix(row[_QUAT])[2]

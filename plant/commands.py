@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -34,15 +34,11 @@ _HOLD_KP: Final = 80.0  # N·m/rad, carries a standing robot
 _HOLD_KD: Final = 3.0  # N·m·s/rad
 
 
-class CommandLimits(NamedTuple):
-    """Least and greatest numbers of a command's row, (60,) each."""
+def command_limits(robot: RobotSpec) -> tuple[Array, Array]:
+    """Least and greatest numbers of a command's row, (60,) each, of a kind of robot.
 
-    least: Array
-    most: Array
-
-
-def command_limits(robot: RobotSpec) -> CommandLimits:
-    """The limits of a kind of robot. Zeros, which damp nothing and hold nothing, are within."""
+    Zeros, which damp nothing and hold nothing, are within.
+    """
     speed = np.tile(robot.speed, 4)
     angle = np.maximum(np.abs(robot.lower), np.abs(robot.upper)) + _BEYOND
     bounds = {
@@ -56,18 +52,7 @@ def command_limits(robot: RobotSpec) -> CommandLimits:
     least = -most
     for gain in ("kp", "kd"):  # one below zero drives what it should hold
         least[Command.CUTS[gain]] = 0.0
-    return CommandLimits(least, most)
-
-
-def describe_excess(command: Command, limits: CommandLimits) -> str:
-    """Which number of a command is beyond the limits, in words; "" if none is."""
-    beyond = (command.row < limits.least) | (command.row > limits.most)
-    if not beyond.any():
-        return ""
-    at = int(beyond.argmax())
-    name = next(name for name, cut in Command.CUTS.items() if at < cut.stop)
-    least, most = limits.least[at], limits.most[at]
-    return f"command.{name}: got {command.row[at]:g}, expected {least:g} … {most:g}"
+    return least, most
 
 
 class CommandBox:
@@ -87,7 +72,7 @@ class CommandBox:
 
     def __init__(self, team: str, names: Iterable[str], robot: RobotSpec) -> None:
         self.robots = {COMMAND.key(team, name): name for name in names}
-        self._limits = command_limits(robot)
+        self._least, self._most = command_limits(robot)
         self.latest: dict[str, Command] = {}
         self.invalid: Counter[str] = Counter()
         self.errors: dict[str, str] = {}
@@ -126,8 +111,13 @@ class CommandBox:
             wanted = f"{first} … {tick}" if first < tick else f"{first}"
             self.refused[robot] = f"command.tick: got {command.tick}, expected {wanted}"
             return ""
-        if excess := describe_excess(command, self._limits):
-            return self._refuse_invalid(robot, excess)
+        beyond = (command.row < self._least) | (command.row > self._most)
+        if beyond.any():
+            at = int(beyond.argmax())
+            name = next(name for name, cut in Command.CUTS.items() if at < cut.stop)
+            wanted = f"{self._least[at]:g} … {self._most[at]:g}"
+            got = f"command.{name}: got {command.row[at]:g}"
+            return self._refuse_invalid(robot, f"{got}, expected {wanted}")
         self.latest[robot] = command
         self.refused.pop(robot, None)
         return robot

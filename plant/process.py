@@ -6,11 +6,9 @@ from collections.abc import Callable
 from contextlib import nullcontext
 from typing import Final
 
-from quadriga.plant.lockstep import run_lockstep
-from quadriga.plant.pace import TeamPace
+from quadriga.plant.loops import TeamPace, run_lockstep, run_realtime
 from quadriga.plant.protocol import TOLD_TO_STOP, End, Plant
-from quadriga.plant.realtime import run_realtime
-from quadriga.plant.requests import subscribe_requests
+from quadriga.plant.requests import find_estop, subscribe_requests
 from quadriga.plant.server import PlantServer
 from quadriga.shared import codes
 from quadriga.shared.bus.discovery import ProcessInfo, await_agents, join, start_together
@@ -79,7 +77,7 @@ def run(
         server.requests = subscribe_requests(bus)
         if plant.is_robot:
             estops = subscribe_requests(bus)
-            plant.listen(lambda: estops().estop, server.take_event)
+            plant.listen(lambda: find_estop(estops()), server.take_event)
         me = ProcessInfo(bus, config)
         if not join(bus, config, stopped, me):
             return

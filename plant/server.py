@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import sys
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Final
 
 from quadriga.plant.commands import CommandBox, damp_joints
 from quadriga.plant.protocol import End, Plant
-from quadriga.plant.requests import NO_REQUESTS, Requests
+from quadriga.plant.requests import find_estop
 from quadriga.plant.team_time import TeamTime
 from quadriga.shared import codes
 from quadriga.shared.bus.liveness import find_lost_link
@@ -19,7 +19,17 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.members import plant_name
-from quadriga.shared.messages import Clock, Command, Event, Reset, SafeStop, Status, format_event
+from quadriga.shared.messages import (
+    Clock,
+    Command,
+    Event,
+    LiveFault,
+    Message,
+    Reset,
+    SafeStop,
+    Status,
+    format_event,
+)
 from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.topics import CLOCK, EVENT, POSTURE, STATE, STATUS, TRUTH
 
@@ -52,12 +62,11 @@ class PlantServer:
         self.time = TeamTime(config, robot)
         self.commands = CommandBox(team, plant.names, config.robot)
         self.keys = tuple(sorted({*self.time.keys, *self.commands.robots}))
-        self.requests: Callable[[], Requests] = lambda: NO_REQUESTS
+        self.requests: Callable[[], Sequence[Message]] = tuple
         self._estopped = -1  # tick of the last answer to the emergency stop in force; −1: none is
         self._stop = ""  # why somebody has asked the team to stop, and the walk to end
-        # A request may come twice; a release may end no stop that was pressed meanwhile.
-        self._last_stop: SafeStop | None = None
-        self._last_reset: Reset | None = None
+        # What is said may come twice; a release may end no stop that was pressed meanwhile.
+        self._heard: dict[type[Message], Message] = {}
         self._put_state = {
             name: bus.publisher(STATE.key(team, name), droppable=realtime) for name in plant.names
         }
@@ -151,9 +160,8 @@ class PlantServer:
     def step(self, commands: Mapping[str, Command]) -> End | None:
         """Advance the plant by one tick; why the walk ends, if it does."""
         self._report_invalid()
-        requests = self.requests()
-        if requests is not NO_REQUESTS:
-            self._obey(requests)
+        if asked := self.requests():
+            self._obey(asked)
         if self._estopped >= 0:
             commands = {name: damp_joints(self.plant.tick) for name in self.plant.names}
         for event in self.plant.step(commands):
@@ -172,32 +180,31 @@ class PlantServer:
             return End(codes.STOPPED, self._stop)
         return End(codes.TIME_OVER, "end of world.duration")
 
-    def _obey(self, requests: Requests) -> None:
+    def _obey(self, asked: Sequence[Message]) -> None:
         """Do what people have asked for; an emergency stop outranks its release."""
         plant, tick = self.plant, self.plant.tick
-        for fault in requests.faults:
-            self._inject(fault)
-        robot = "" if self.time.alone else plant.names[0]
-        stop = requests.stop
-        if stop is not None and stop != self._last_stop and self.time.drives:
-            self._last_stop = stop
-            end = "; the walk ends" if stop.ends else ""
-            self.announce(codes.STOP_ASKED, "", f"{stop.reason}{end}")
-            if stop.ends and not self._stop:
-                self._stop = stop.reason or codes.STOPPED
-                self._last_tick = min(self._last_tick, tick + STOP_LINGER_MS)
-        if plant.is_robot:
-            return
-        reset = requests.reset
-        if reset is not None and reset != self._last_reset:
-            self._last_reset = reset
-            if 0 <= self._estopped <= reset.tick and not requests.estop:
+        estop, robot = find_estop(asked), "" if self.time.alone else plant.names[0]
+        for message in asked:
+            if isinstance(message, LiveFault):
+                self._inject(message.fault)
+            elif message == self._heard.get(type(message)):
+                continue
+            elif isinstance(message, SafeStop) and self.time.drives:
+                end = "; the walk ends" if message.ends else ""
+                self.announce(codes.STOP_ASKED, "", f"{message.reason}{end}")
+                if message.ends and not self._stop:
+                    self._stop = message.reason or codes.STOPPED
+                    self._last_tick = min(self._last_tick, tick + STOP_LINGER_MS)
+            elif isinstance(message, Reset) and 0 <= self._estopped <= message.tick and not estop:
                 self._estopped = -1
-                self.announce(codes.RESET, robot, f"by {reset.by}: robots may stand up")
+                self.announce(codes.RESET, robot, f"by {message.by}: robots may stand up")
                 plant.expect_down(())
-        if requests.estop and (self._estopped < 0 or tick >= self._estopped + _ANSWER_MS):
+            self._heard[type(message)] = message
+        if plant.is_robot or not estop:
+            return
+        if self._estopped < 0 or tick >= self._estopped + _ANSWER_MS:
             self._estopped = tick
-            self.announce(codes.ESTOPPED, robot, f"{requests.estop}: every joint is damped")
+            self.announce(codes.ESTOPPED, robot, f"{estop}: every joint is damped")
             plant.expect_down(plant.names)
 
     def _inject(self, fault: str) -> None:

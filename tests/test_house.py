@@ -18,9 +18,9 @@ ROOTS: Final = (*WALLS, "quadriga", "benchmarks")
 # Lines of each package, of Python and of pages, docstrings and blanks included. Lowering one is
 # always right; raising one needs a reason beside it.
 BUDGETS: Final[Mapping[str, int]] = {
-    "agents": 9_760,  # planned: 8,000; left: cooperation, periodic fits, rigid body, validation
-    "plant": 1_145,  # planned: 1,000; left: states and commands over the bus
-    "sim_server": 2_640,  # planned: 2,600
+    "agents": 9_693,  # planned: 8,000; left: cooperation, periodic fits, rigid body, validation
+    "plant": 1_105,  # planned: 1,000; left: states and commands over the bus
+    "sim_server": 2_639,  # planned: 2,600
     "bridges": 1_915,
     "shared": 8_665,  # planned: 7,200; left: Unitree's protocols, the barrier, 550 lines of keys
     "quadriga": 39_735,  # planned: 18,200; left: harnesses of experiments, report, commands

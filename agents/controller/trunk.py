@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -13,9 +12,6 @@ from quadriga.shared.runtime.jit import compiled
 
 SETTLED_S: Final = 2.0  # of standing, from which on the feet tell the heading
 FOLLOW_S: Final = 1.0  # time constant: encoders' noise stays out of the heading
-_FOLLOWS_S: Final = SETTLED_S + 3.0 * FOLLOW_S  # of standing, from which on drift is averaged
-DRIFT_KNOWN_S: Final = _FOLLOWS_S + 2.0  # of standing, from which on the mean is used
-DRIFT_MOST: Final = math.radians(1.0)  # rad/s: feet that seem to turn faster do turn
 _Z_LIMIT: Final = 0.05  # m·s, height integrator
 _SPEED_LIMIT: Final = 0.15  # m, speed integrator
 # s, of the speed integrator's forgetting: yoked robots share one speed, and without a leak their
@@ -106,28 +102,18 @@ def keep_heading(state: np.record) -> None:
     """Have the desired heading of a robot that stands for long turn as its feet seem to.
 
     An IMU's yaw drifts. A trunk that is kept at a drifting heading twists over feet that stand
-    still, until its legs reach no further. In a walk the heading turns as fast as feet turned in
-    the last long stand, but for turns that are too fast for a drift.
+    still, until its legs reach no further.
     """
     stands = state.half_cycle < 0.0 and np.sum(state.contact) == N_LEGS
     state.stood_s = state.stood_s + state.dt if stands else 0.0
     p_foot = state.p_foot
     forward = p_foot[0] + p_foot[1] - p_foot[2] - p_foot[3]
     heading_of_feet = np.arctan2(forward[1], forward[0])
-    if state.stood_s < SETTLED_S:
-        if state.yaw_drift != 0.0:
-            state.yaw_des = wrap_angle(state.yaw_des + state.dt * state.yaw_drift)
-        if stands:
-            state.heading_over_feet = wrap_angle(state.yaw_des - heading_of_feet)
-            state.drift_mean = 0.0
-        return
-    rate = wrap_angle(heading_of_feet + state.heading_over_feet - state.yaw_des) / FOLLOW_S
-    state.yaw_des = wrap_angle(state.yaw_des + state.dt * rate)
-    if state.stood_s > _FOLLOWS_S and abs(rate) <= DRIFT_MOST:
-        share = min(1.0, state.dt / (state.stood_s - _FOLLOWS_S))
-        state.drift_mean += share * (rate - state.drift_mean)
-    if state.stood_s > DRIFT_KNOWN_S:
-        state.yaw_drift = state.drift_mean
+    if state.stood_s >= SETTLED_S:
+        rate = wrap_angle(heading_of_feet + state.heading_over_feet - state.yaw_des) / FOLLOW_S
+        state.yaw_des = wrap_angle(state.yaw_des + state.dt * rate)
+    elif stands:
+        state.heading_over_feet = wrap_angle(state.yaw_des - heading_of_feet)
 
 
 @compiled

@@ -99,8 +99,6 @@ ROBOT_STATE: Final = np.dtype(
             ("v_des", float, 2),  # of the trunk, m/s, odometry
             ("stood_s", float),  # for how long all feet have stood, as they are meant to, s
             ("heading_over_feet", float),  # desired heading less that of the feet, rad
-            ("drift_mean", float),  # at which the feet seem to turn in this stand, rad/s
-            ("yaw_drift", float),  # of the IMU by the last long stand, rad/s
             ("force_sum", float, N_FORCES),  # of the planned forces in this sample, N, yaw frame
             ("force_count", float),  # ticks of it
             # What the whole-body QP is asked for, odometry.

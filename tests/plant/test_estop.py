@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import cast
 
@@ -9,28 +10,27 @@ import numpy as np
 import pytest
 
 from quadriga.plant.commands import MOTOR_DAMPING
-from quadriga.plant.requests import NO_REQUESTS, Requests
 from quadriga.plant.server import STOP_LINGER_MS, PlantServer
 from quadriga.shared import codes
 from quadriga.shared.bus.session import Bus
 from quadriga.shared.config.sections import Config
-from quadriga.shared.messages import Reset, SafeStop
+from quadriga.shared.messages import EStop, Message, Reset, SafeStop
 from quadriga.sim_server.world.world import World
 from tests.plant.test_server import Listener, served
 from tests.sim_server.standing import STAND
 
 
-def ask(server: PlantServer, *requests: Requests) -> None:
+def ask(server: PlantServer, *requests: Sequence[Message]) -> None:
     """Have people ask for something at each of the next ticks, and nothing after."""
     asked = iter(requests)
-    server.requests = lambda: next(asked, NO_REQUESTS)
+    server.requests = lambda: next(asked, ())
 
 
 def test_whatever_agents_command_after_it_the_joints_are_damped() -> None:
     server, listener = served(initial_posture="standing")
     for _ in range(50):
         server.step({"r1": STAND})
-    ask(server, Requests("operator: dog"))
+    ask(server, [EStop(0, 0, "operator: dog")])
     for _ in range(100):
         before = server.plant.states()["r1"]
         server.step({"r1": STAND})
@@ -45,29 +45,30 @@ def test_a_world_of_one_robot_among_several_names_it() -> None:
     config, listener = Config(), Listener()
     world = World(config, ("r2",))
     server = PlantServer(config, world, cast("Bus", listener), "r2")
-    server.requests = lambda: Requests("now")
+    ask(server, [EStop(0, 0, "now")])
     server.step({"r2": STAND})
     assert [e.robot for e in listener.events() if e.code == codes.ESTOPPED] == ["r2"]
 
 
-def reset(tick: int, by: str = "ann") -> Requests:
-    return Requests(reset=Reset(tick, 0, by))
+def reset(tick: int, by: str = "ann") -> list[Message]:
+    return [Reset(tick, 0, by)]
 
 
-PRESSED, NOBODY = Requests("dog"), NO_REQUESTS
+PRESSED: list[Message] = [EStop(0, 0, "dog")]
+NOBODY: list[Message] = []
 
 
 @pytest.mark.parametrize(
     ("asked", "stops", "releases"),
     [
-        ([reset(0)._replace(estop="dog"), NOBODY, reset(2)], [0], [2]),
+        ([[*reset(0), *PRESSED], NOBODY, reset(2)], [0], [2]),
         ([PRESSED, reset(0), PRESSED, reset(0), reset(9, "bob")], [0, 2], [1, 4]),  # came twice
         ([NOBODY, PRESSED, reset(0), reset(1)], [1], [3]),  # was said before the stop
         ([PRESSED] * 250, [0, 100, 200], []),  # an answer, though not at every tick
     ],
 )
 def test_only_a_release_that_was_said_after_it_ends_it(
-    asked: list[Requests], stops: list[int], releases: list[int]
+    asked: list[list[Message]], stops: list[int], releases: list[int]
 ) -> None:
     server, listener = served(initial_posture="standing")
     ask(server, *asked)
@@ -105,7 +106,7 @@ def test_a_stopped_robot_sinks_and_that_is_no_fall_but_one_after_its_release_is(
 @pytest.mark.parametrize("ends", [False, True])
 def test_a_walk_that_is_to_be_over_is_once_the_team_has_had_time_to_stand(ends: bool) -> None:
     server, listener = served(initial_posture="standing")
-    ask(server, NO_REQUESTS, Requests(stop=SafeStop(0, 0, "lunch", ends)))
+    ask(server, NOBODY, [SafeStop(0, 0, "lunch", ends)])
     over = [server.step({"r1": STAND}) for _ in range(STOP_LINGER_MS + 2)]
     asked = [(e.tick, e.detail) for e in listener.events() if e.code == codes.STOP_ASKED]
     assert asked == [(1, "lunch; the walk ends" if ends else "lunch")]
@@ -116,6 +117,6 @@ def test_a_walk_that_is_to_be_over_is_once_the_team_has_had_time_to_stand(ends: 
 def test_only_who_drives_time_ends_a_walk() -> None:
     config, listener = Config(), Listener()
     server = PlantServer(config, World(config, ("r2",)), cast("Bus", listener), "r2")
-    ask(server, Requests(stop=SafeStop(0, 0, "lunch", True)))
+    ask(server, [SafeStop(0, 0, "lunch", True)])
     assert [server.step({"r2": STAND}) for _ in range(STOP_LINGER_MS + 9)][-1] is None
     assert not listener.events()

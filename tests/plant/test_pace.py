@@ -11,8 +11,8 @@ from typing import cast
 
 import pytest
 
-from quadriga.plant import pace as module
-from quadriga.plant.pace import TeamPace
+from quadriga.plant import loops as module
+from quadriga.plant.loops import TeamPace
 from quadriga.shared.bus.diagnostics import MemberAnswer, members
 from quadriga.shared.bus.discovery import ProcessInfo, join
 from quadriga.shared.bus.session import READY, Bus

@@ -12,8 +12,6 @@ from hypothesis import strategies as st
 
 from quadriga.agents.controller.trunk import (
     COMMAND,
-    DRIFT_KNOWN_S,
-    DRIFT_MOST,
     FOLLOW_S,
     LEAK,
     POSITION_LIMIT,
@@ -24,10 +22,7 @@ from quadriga.agents.controller.trunk import (
     trunk_reference,
 )
 from quadriga.agents.estimator.kinematics import wrap_angle
-from quadriga.identification.rollout import Rollout
-from quadriga.shared.config.load import load
 from quadriga.shared.robots.conventions import Array
-from quadriga.team.operator import references_of
 from tests.a1 import STAND_HEIGHT, nominal_forces
 from tests.agents.estimator.poses import DT, gains_of, random_pose, standing_pose
 
@@ -212,44 +207,3 @@ def test_after_a_short_stand_the_heading_turns_with_the_feet_a_time_constant_beh
     angle = stand(state, 20.0, rate) - rate * SETTLED_S  # the first stand turns the frame back
     expected = wrap_angle(0.3 + angle - rate * FOLLOW_S)
     assert wrap_angle(state.yaw_des - expected) == pytest.approx(0.0, abs=2e-3 * abs(rate))
-
-
-@pytest.mark.parametrize("turn", [0.0, 0.5, -2.0])
-def test_it_learns_the_drift_but_not_from_turns_by_hand_and_walks_on_with_it(turn: float) -> None:
-    state, drift = standing_pose(0.3), 0.004
-    stand(state, DRIFT_KNOWN_S - 0.01, drift)
-    assert state.yaw_drift == 0.0
-    state = standing_pose(0.3)
-    stand(state, 18.0, drift)
-    feet = state.p_foot.copy()
-    for tick in range(1, 6001):  # within two seconds, while the IMU drifts on
-        angle = drift * tick * DT + turn * min(1.0, tick / 2000)
-        state.p_foot = feet @ pin.utils.rotate("z", angle).T
-        keep_heading(state)
-    assert abs(state.yaw_drift - drift) < (2.0 * DRIFT_MOST * FOLLOW_S / 19.0 if turn else 1e-4)
-    before, state.half_cycle = float(state.yaw_des), 0.0
-    for _ in range(1000):
-        keep_heading(state)
-    assert wrap_angle(state.yaw_des - before) == pytest.approx(state.yaw_drift)
-    assert state.stood_s == 0.0
-
-
-def test_a_robot_stands_on_although_its_imu_turns() -> None:
-    """It walked, and its operator left. A heading by the IMU would turn the trunk as far."""
-    given = {"team.robots": 1, "planner.kind": "none", "world.seed": 53}
-    config = load(None, given | {"sensors.yaw_drift": 0.05})
-    references = references_of(config)
-    rollout = Rollout(config, None, lambda tick: references(tick) if tick < 1000 else None)
-    settled = imu = 0.0
-
-    def yaw(quat: Any) -> float:
-        w, x, y, z = np.asarray(quat).ravel()
-        return float(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
-
-    for tick in rollout.ticks(16000):
-        if tick.tick in (9000, 15999):
-            settled = yaw(rollout.world.truth().base_quat_wxyz) - settled
-            imu = yaw(rollout.world.states()["r1"].imu_quat_wxyz) - imu
-    assert abs(imu) > np.radians(15.0), "the IMU has drifted meanwhile"
-    assert abs(settled) < np.radians(1.5)
-    assert rollout.world.fallen() == ()

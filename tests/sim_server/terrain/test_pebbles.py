@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import mujoco
 import numpy as np
 import pytest
 
-from quadriga.pictures.mujoco_frames import add_stones
 from quadriga.shared.codec import encode
 from quadriga.shared.robots.conventions import GRAVITY, N_LEGS, Array
 from quadriga.sim_server.terrain.pebbles import LooseStones, Pebbles
@@ -98,37 +96,3 @@ def test_stones_are_left_where_they_lie_and_found_there_again() -> None:
     before = stones._q.copy()
     stand(world, 100)
     np.testing.assert_array_equal(stones._q, before)  # … and do not fall
-
-
-def test_friction_and_stiffness_are_those_of_the_stones() -> None:
-    world = strewn(friction=0.35)
-    stand(world, 300)
-    contact = world.physics.contact
-    stone = world.team.model.geom_priority[contact.geom].max(axis=1) == 2
-    assert stone.sum() > 10
-    np.testing.assert_allclose(contact.friction[:, 0], 0.35)
-    np.testing.assert_allclose(contact.solref[stone, 0], 0.004)
-    feet = np.isin(contact.geom, world._feet).any(axis=1)
-    assert (stone & feet).any()
-    kinds = world.team.model.geom_type[contact.geom[stone & ~feet]]
-    assert (kinds == mujoco.mjtGeom.mjGEOM_ELLIPSOID).any(axis=1).all()
-
-
-@pytest.mark.parametrize("room", [5000, 40])
-def test_the_stones_around_a_place_are_drawn_the_nearest_first(room: int) -> None:
-    pebbles, model = parts(strewn())[0], strewn().team.model
-    scene = mujoco.MjvScene(model, maxgeom=room)
-    centre = np.array([2.0, 0.1])
-    stones = pebbles.stones_near(centre, room, 0.5)
-    add_stones(scene, stones)
-    away = np.sort(np.linalg.norm(pebbles.pose[:, :2] - centre, axis=1))
-    count = min(room, int((away <= 0.5).sum()))
-    drawn = np.array([scene.geoms[i].pos for i in range(scene.ngeom)])
-    assert len(drawn) == count > 10
-    np.testing.assert_allclose(
-        np.linalg.norm(drawn[:, :2] - centre, axis=1), away[:count], atol=1e-6
-    )
-    np.testing.assert_allclose(
-        [scene.geoms[i].size for i in range(count)], stones.halves, rtol=1e-6
-    )
-    assert (stones.poses[:, 2] == stones.halves[:, 2]).all(), "each lies on the ground"
