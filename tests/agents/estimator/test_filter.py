@@ -100,6 +100,15 @@ class Rolling:
             q = pin.integrate(MODEL, q, DT * self.rates(pin.integrate(MODEL, q, 0.5 * DT * v)))
 
 
+def test_standing_still_stays_still() -> None:
+    state = begun(sensed(*standing()))
+    for _ in range(1000):
+        step(state, sensed(*standing()))
+    np.testing.assert_allclose(state.velocity, 0.0, atol=1e-12)
+    np.testing.assert_allclose(state.position, [0.0, 0.0, STAND_HEIGHT], atol=1e-12)
+    np.testing.assert_allclose(state.p_foot[:, 2], FOOT_RADIUS, atol=1e-12)
+
+
 def test_an_error_of_the_accelerometer_becomes_no_speed() -> None:
     """Of a robot that stands; the error is found, without that it is 92 mm/s for each m/s²."""
     sensors, speeds = sensed(*standing(), np.array([0.1, -0.1, 0.15])), []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -96,3 +97,17 @@ def test_stones_are_left_where_they_lie_and_found_there_again() -> None:
     before = stones._q.copy()
     stand(world, 100)
     np.testing.assert_array_equal(stones._q, before)  # … and do not fall
+
+
+def test_friction_and_stiffness_are_those_of_the_stones() -> None:
+    world = strewn(friction=0.35)
+    stand(world, 300)
+    contact = world.physics.contact
+    stone = world.team.model.geom_priority[contact.geom].max(axis=1) == 2
+    assert stone.sum() > 10
+    np.testing.assert_allclose(contact.friction[:, 0], 0.35)
+    np.testing.assert_allclose(contact.solref[stone, 0], 0.004)
+    feet = np.isin(contact.geom, world._feet).any(axis=1)
+    assert (stone & feet).any()
+    kinds = world.team.model.geom_type[contact.geom[stone & ~feet]]
+    assert (kinds == mujoco.mjtGeom.mjGEOM_ELLIPSOID).any(axis=1).all()
