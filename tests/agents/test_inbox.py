@@ -121,25 +121,36 @@ def test_the_state_at_which_a_sample_ends_is_not_passed_over() -> None:
 
 
 @pytest.mark.parametrize("mode", ["lockstep", "realtime"])
+@pytest.mark.parametrize("lead", [1001, 10_000, (1 << 42) - 3000])
 def test_what_is_of_a_time_far_ahead_is_refused_and_nobody_is_taken_to_have_spoken(
-    mode: str,
+    mode: str, lead: int
 ) -> None:
-    box, now, early = arrivals(mode, estimator="truth"), 2000, 3001
-    feed(box, ("r2/state", standing(now)))
-    feed(box, ("r1/plan", plan(-(-early // 40))), ("r3/measurement", measurement(early)))
-    feed(box, ("reference", reference(early)))
-    feed(box, ("sim/truth", replace(truth(("r1", "r2", "r3"), 3), tick=early)))
-    assert box.counters == {
-        f"ahead_{name}": 1 for name in ("plan", "measurement", "reference", "sim/truth")
-    }
+    box, step = arrivals(mode, estimator="truth"), -(-(2000 + lead) // 40)
+    feed(box, ("r2/state", standing(2000)))
+    early: list[tuple[str, Message]] = [
+        ("r1/plan", plan(step)), ("r1/plan", replace(plan(step), tick=2000)),
+        ("r3/measurement", measurement(2000 + lead)), ("reference", reference(2000 + lead)),
+        ("sim/truth", replace(truth(("r1", "r2", "r3"), 3), tick=2000 + lead)),
+    ]  # fmt: skip
+    for _ in range(400):
+        feed(box, *early)
+    named = {"plan": 800, "measurement": 400, "reference": 400, "sim/truth": 400}
+    assert box.counters == {f"ahead_{name}": count for name, count in named.items()}
     assert box.refused
     assert not box.received["plan", "r1"]
-    expected = Expected((50, 0), now, now, True)
-    assert len(box.missing_sources(now, expected)) == 6
-    feed(box, ("r1/plan", plan(50)), ("reference", reference(now)), ("reference", reference(3000)))
-    inputs = box.pop_inputs(standing(now), expected)
+    expected = Expected((50, 0), 2000, 2000, True)
+    assert len(box.missing_sources(2000, expected)) == 6
+    feed(
+        box,
+        ("r1/plan", plan(50)),
+        ("r3/measurement", measurement(2000)),
+        ("reference", reference(2000)),
+        ("reference", reference(3000)),
+    )
+    inputs = box.pop_inputs(standing(2000), expected)
     assert [found.step for _, found in inputs.plans] == [50]
-    due = [now] if mode == "lockstep" else [now, 3000]
+    assert [sample.tick for _, sample in inputs.measurements] == [2000]
+    due = [2000] if mode == "lockstep" else [2000, 3000]
     assert [found.tick for found in inputs.references] == due
 
 

@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from quadriga.pictures.mujoco_frames import add_stones
 from quadriga.shared.codec import encode
 from quadriga.shared.robots.conventions import GRAVITY, N_LEGS, Array
 from quadriga.sim_server.terrain.pebbles import LooseStones, Pebbles
@@ -111,3 +112,23 @@ def test_friction_and_stiffness_are_those_of_the_stones() -> None:
     assert (stone & feet).any()
     kinds = world.team.model.geom_type[contact.geom[stone & ~feet]]
     assert (kinds == mujoco.mjtGeom.mjGEOM_ELLIPSOID).any(axis=1).all()
+
+
+@pytest.mark.parametrize("room", [5000, 40])
+def test_the_stones_around_a_place_are_drawn_the_nearest_first(room: int) -> None:
+    pebbles, model = parts(strewn())[0], strewn().team.model
+    scene = mujoco.MjvScene(model, maxgeom=room)
+    centre = np.array([2.0, 0.1])
+    stones = pebbles.stones_near(centre, room, 0.5)
+    add_stones(scene, stones)
+    away = np.sort(np.linalg.norm(pebbles.pose[:, :2] - centre, axis=1))
+    count = min(room, int((away <= 0.5).sum()))
+    drawn = np.array([scene.geoms[i].pos for i in range(scene.ngeom)])
+    assert len(drawn) == count > 10
+    np.testing.assert_allclose(
+        np.linalg.norm(drawn[:, :2] - centre, axis=1), away[:count], atol=1e-6
+    )
+    np.testing.assert_allclose(
+        [scene.geoms[i].size for i in range(count)], stones.halves, rtol=1e-6
+    )
+    assert (stones.poses[:, 2] == stones.halves[:, 2]).all(), "each lies on the ground"

@@ -75,6 +75,15 @@ def test_a_wrong_motor_gives_the_opposite_torque() -> None:
     np.testing.assert_allclose(torque(wrong), -torque(row), rtol=1e-12)
 
 
+def test_a_wrong_attitude_is_a_unit_quaternion_tilted_by_its_angle() -> None:
+    attitude, *_ = build_components(ROBOTS["a1"])["imu"]
+    for quat in np.random.default_rng(3).normal(size=(20, 4)):
+        sound = quat / np.linalg.norm(quat)
+        wrong = attitude.wrong(sound)
+        assert np.linalg.norm(wrong) == pytest.approx(1.0, abs=1e-12)
+        assert 2.0 * np.arccos(abs(wrong @ sound)) == pytest.approx(0.2, abs=1e-9)
+
+
 def run(kind: str, seed: int = 0) -> Array:
     """What a gyro says in 400 ticks whose sound values are tick, tick + 0.5 and −tick."""
     fault = ComponentFault("r1", "gyro", kind, START, STOP)

@@ -79,6 +79,28 @@ def test_bias_is_drawn_once_per_run_and_robot() -> None:
         assert np.std([run[name][0] for run in runs]) == pytest.approx(sigma, rel=0.2)
 
 
+def test_noise_of_a_robot_does_not_depend_on_the_others() -> None:
+    large, small = Sensors(CONFIG, 5, range(3)), Sensors(CONFIG, 5, range(2))
+    random = np.random.default_rng(0)
+    channels, quat = random.standard_normal((3, N_CHANNELS)), np.tile(LEVEL, (3, 1))
+    for tick in range(130):
+        a = measure(large, tick, channels, quat)[1]
+        b = measure(small, tick, channels[:2], quat[:2])[1]
+        for name in ARRAYS:
+            np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
+    one, other = record(CONFIG, 1, n=1)["q_joint"], record(CONFIG, 1, n=2)["q_joint"]
+    assert (one != other).all()
+
+
+def test_without_noise_the_truth_passes_through() -> None:
+    channels, quat = np.random.default_rng(1).standard_normal((2, N_CHANNELS)), attitudes(2)
+    channels[:, -4:] = np.abs(channels[:, -4:])
+    for i, state in enumerate(measure(Sensors(SILENT, 0, range(2)), 7, channels, quat)):
+        body = [state.q_joint, state.v_joint, state.tau_joint, state.imu_gyro, state.imu_accel]
+        np.testing.assert_array_equal(np.concatenate([*body, state.foot_force]), channels[i])
+        np.testing.assert_allclose(state.imu_quat_wxyz, quat[i], atol=1e-15)
+
+
 def counts_under(config: SensorsConfig, forces: Array, seed: int = 0) -> Array:
     """What a robot's feet read in ticks of these forces, (ticks, 4)."""
     sensors, channels = Sensors(config, seed, range(1)), np.zeros((1, N_CHANNELS))

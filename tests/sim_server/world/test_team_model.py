@@ -5,7 +5,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from quadriga.shared.robots.conventions import FOOT_FRAMES, N_JOINTS
+from quadriga.shared.robots.a1 import A1
+from quadriga.shared.robots.conventions import FOOT_FRAMES, JOINT_NAMES, N_JOINTS
 from quadriga.shared.robots.pinocchio_model import build_pinocchio_model
 from quadriga.shared.robots.registry import ROBOTS
 from quadriga.sim_server.terrain.terrain import TERRAIN_CONTACT
@@ -63,6 +64,17 @@ def test_equals_pinocchio_in_mass_matrix_bias_and_foot_jacobians(kind: str, roto
         np.testing.assert_allclose(
             d.body(f"r1/{foot}").xpos, data.oMf[frame].translation, atol=1e-9
         )
+
+
+def test_every_robot_has_pinocchios_joint_order_and_the_agreed_mass() -> None:
+    model = build_team_model(configured(3)).model
+    assert tuple(build_pinocchio_model(A1).names)[2:] == JOINT_NAMES
+    for robot in ("r1", "r2", "r3"):
+        first = model.joint(f"{robot}/{JOINT_NAMES[0]}").id
+        names = [model.joint(first + k).name for k in range(N_JOINTS)]
+        assert names == [f"{robot}/{name}" for name in JOINT_NAMES]
+        assert model.body(f"{robot}/trunk").mass == 4.713
+        assert model.body(f"{robot}/trunk").subtreemass == pytest.approx(A1.mass)
 
 
 @pytest.mark.parametrize("graph", GRAPHS)

@@ -95,6 +95,17 @@ def test_sensors_belong_to_the_tick_they_are_published_for() -> None:
             )
 
 
+def test_accelerometer_reads_gravity_at_rest_and_nothing_in_free_fall() -> None:
+    world = World(configured(1))
+    stand(world, 1000)
+    np.testing.assert_allclose(world.states()["r1"].imu_accel, [0, 0, GRAVITY], atol=0.1)
+    assert world.states()["r1"].foot_force.sum() == pytest.approx(TOTAL_MASS * GRAVITY, rel=1e-3)
+    shift(world, dz=5.0)
+    stand(world, 300)
+    np.testing.assert_allclose(world.states()["r1"].imu_accel, 0.0, atol=0.05)
+    assert not world.states()["r1"].foot_force.any()
+
+
 def test_a_weak_motor_gives_its_share_of_the_torque_from_its_time_on() -> None:
     config = configured(2, motor_strength="r2:RL_calf:0.01:0.4")
     world, sound = World(config), World(configured(2))
@@ -151,6 +162,23 @@ def test_trunk_height_counts_from_the_terrain_under_the_hips() -> None:
         world.physics.qvel[:] = 0.0
         world.step({})
         assert world.fallen() == fallen
+
+
+def test_who_stands_astride_of_a_block_has_not_fallen() -> None:
+    """The block is under the trunk and nobody touches it; the feet stand on the ground."""
+    world = World(configured(1, terrain="boxes", terrain_height=0.15, duration=8.0))
+    terrain = world.team.terrain
+    x, y = (axis.ravel() for axis in np.meshgrid(np.arange(1.5, 5, 0.02), np.arange(-1, 1, 0.02)))
+    astride = terrain.height(x, y) - terrain.height_under_hips(
+        x, y, np.zeros_like(x), A1.feet_under_hips
+    )
+    place = astride.argmax()
+    assert astride[place] > 0.145, "no such place"
+    world.physics.qpos[:3] = x[place], y[place], 0.26
+    world.physics.qpos[7:] = q_stand()
+    mujoco.mj_forward(world.team.model, world.physics)
+    world.step({"r1": STAND})
+    assert world.fallen() == ()
 
 
 @pytest.mark.parametrize("speed", [np.nan, 1e12])
