@@ -163,6 +163,18 @@ def test_who_does_not_plan_awaits_references_and_the_truth_alone() -> None:
     assert Agent(truthful, "r1", None).expected(401) == Expected(truth=True)
 
 
+def test_excitation_is_added_on_the_stance_feet_while_walking() -> None:
+    robot, noise = Robot(), np.arange(1.0, 13.0)
+    for _ in range(521):
+        outputs = robot.step(excitation=noise)
+        if outputs.measurement is None:
+            continue
+        tick = outputs.measurement.tick
+        stance = scheduled_stance(ALONE, 0, np.array([tick - 10]))[0]
+        disturbance = noise * np.repeat(stance, 3) if tick > 300 else 0.0
+        np.testing.assert_allclose(outputs.measurement.u, nominal_forces(stance) + disturbance)
+
+
 @pytest.mark.parametrize(
     ("lost_samples", "back", "end"),
     [(0.03, 1000, ("walk", "")), (0.3, 1100, ("stand", "window-lost"))],

@@ -57,6 +57,25 @@ def test_a_tilt_beyond_the_limit_is_a_fall(sign: float) -> None:
         outputs = robot.step()
 
 
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_robot_that_points_straight_up_or_down_has_fallen(sign: float) -> None:
+    robot = Robot()
+    robot.run(400)
+    quat = np.array([0.5, -0.5 * sign, 0.5 * sign, 0.5])
+    for _ in range(AGREES_MS):  # an attitude that jumps is not believed at once
+        assert not is_damping(robot.step(over_the_bus(pointing(robot.tick, quat))))
+    outputs = robot.step(over_the_bus(pointing(robot.tick, quat)))
+    assert is_damping(outputs)
+    assert (outputs.mode, outputs.reason) == ("passive", "fall")
+
+
+def pointing(tick: int, quat: Array) -> State:
+    """Its accelerometer measures what is along the vertical of this attitude."""
+    w, x, y, z = quat
+    up = np.array([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)])
+    return replace(standing(tick), imu_quat_wxyz=quat, imu_accel=GRAVITY * up)
+
+
 @pytest.mark.parametrize("nothing", [0.0, np.nan])
 def test_a_robot_without_an_attitude_stands_by_its_joints(nothing: float) -> None:
     robot = Robot()
@@ -85,10 +104,12 @@ def test_a_robot_without_an_attitude_stands_by_its_joints(nothing: float) -> Non
 KNEE = 5
 
 
-def without(state: State) -> State:
-    """A state without the angle of a knee."""
+def without(state: State, *, attitude: bool = True) -> State:
+    """A state without the angle of a knee, or without any attitude, too."""
     row = state.row.copy()
     row[State.CUTS["q_joint"].start + KNEE] = 0.0
+    if not attitude:
+        row[State.CUTS["imu_quat_wxyz"]] = np.nan
     return State.from_row(state.tick, state.stamp_ns, row)
 
 
@@ -110,6 +131,18 @@ def test_a_robot_without_the_encoder_of_a_knee_does_not_lead_that_knee() -> None
     robot.step()
     outputs = robot.run(robot.tick + 40)
     assert not outputs.command.kp.any()  # it knows the knee again
+
+
+def test_who_stands_without_an_attitude_does_not_lead_a_knee_that_is_not_known() -> None:
+    robot = Robot()
+    robot.run(400)
+    for _ in range(150):
+        robot.step(replace(standing(robot.tick), imu_quat_wxyz=np.full(4, np.nan)))
+    outputs = robot.step(without(standing(robot.tick), attitude=False))
+    assert (outputs.mode, outputs.reason) == ("stand", "imu-lost")
+    assert outputs.command.kp[KNEE] == outputs.command.kd[KNEE] == 0.0
+    assert outputs.command.tau[KNEE] > 0.0
+    assert np.count_nonzero(outputs.command.kp) == 11
 
 
 def fail(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,6 +13,7 @@ from quadriga.agents.gait import (
     STANDING,
     Gait,
     gait_phase,
+    horizon_stance,
     phase_of,
     scheduled_stance,
     walking_steps,
@@ -92,3 +93,22 @@ def test_a_phase_returns_with_the_gait(tick: int, phases: int) -> None:
     assert 0 <= found < phases
     assert gait_phase(tick + 400, 300, 200, phases) == found
     assert gait_phase(tick + 200, 300, 200, 2) == 1 - gait_phase(tick, 300, 200, 2)
+
+
+@settings(deadline=None)
+@given(st.integers(300, 5000), st.integers(0, 1))
+def test_two_phases_are_the_two_diagonal_pairs(tick: int, robot: int) -> None:
+    stance = scheduled_stance(Config(), robot, np.array([tick]))[0]
+    assert stance[0] == (gait_phase(tick, 300, 200, 2) == robot)  # every second robot is opposite
+
+
+@pytest.mark.parametrize("stance_ms", [150, 200, 250])
+def test_equal_phases_have_equal_stance_patterns_once_as_fine_as_the_steps(stance_ms: int) -> None:
+    config = Config()
+    config = replace(config, gait=replace(config.gait, stance_ms=stance_ms))
+    finest = 2 * stance_ms // 10
+    patterns: dict[int, set[bytes]] = {}
+    for step in walking_steps(config):
+        pattern = horizon_stance(config, 0, step).tobytes()
+        patterns.setdefault(phase_of(config, step, finest), set()).add(pattern)
+    assert all(len(found) == 1 for found in patterns.values())

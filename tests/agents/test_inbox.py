@@ -344,6 +344,12 @@ def test_references_lead_back(topic: str, sender: str, first: int, second: int) 
     assert parse_message_id(format_message_id((topic, sender), order)) == ((topic, sender), order)
 
 
+@given(text=st.text(max_size=20))
+def test_foreign_references_are_no_error(text: str) -> None:
+    found = parse_message_id(text)
+    assert found is None or len(found) == 2
+
+
 def test_in_real_time_all_that_was_taken_in_is_listed() -> None:
     said = Status(500, 0, "walk", "", "", {}, {}, np.zeros(0), np.zeros(0))
     told = replace(full(541), statuses=(("r1", said),))

@@ -8,7 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from quadriga.agents.validate import AGREES_MS, HOLD_YOKED_MS, Validated, Validator
+from quadriga.agents.validate import (
+    AGREES_MS,
+    HOLD_YOKED_MS,
+    Validated,
+    Validator,
+    standing_torques,
+)
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.config.load import load
 from quadriga.shared.messages import State
@@ -137,6 +143,13 @@ def test_without_any_reading_the_trunk_is_level_and_after_a_pause_a_joint_is_any
     away = with_knee(moving(2000), A1.q_stand[KNEE] - 0.5)
     assert VALIDATOR.step(read.memory, away, 2.0).complete
     assert not VALIDATOR.step(read.memory, away, DT).complete
+
+
+def test_a_motor_without_its_angle_bears_a_quarter_of_the_weight() -> None:
+    _, thigh, calf = A1.q_stand[:3]
+    lever = A1.geometry.link * abs(np.sin(thigh + calf))  # of a vertical force at the foot
+    bears = lever * GRAVITY * A1.geometry.mass / 4.0
+    assert abs(standing_torques(A1)[KNEE]) == pytest.approx(bears, rel=0.03)
 
 
 @pytest.mark.parametrize("robots", [1, 2])

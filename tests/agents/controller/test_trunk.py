@@ -22,7 +22,10 @@ from quadriga.agents.controller.trunk import (
     trunk_reference,
 )
 from quadriga.agents.estimator.kinematics import wrap_angle
+from quadriga.identification.rollout import Rollout
+from quadriga.shared.config.load import load
 from quadriga.shared.robots.conventions import Array
+from quadriga.team.operator import references_of
 from tests.a1 import STAND_HEIGHT, nominal_forces
 from tests.agents.estimator.poses import DT, gains_of, random_pose, standing_pose
 
@@ -207,3 +210,24 @@ def test_after_a_short_stand_the_heading_turns_with_the_feet_a_time_constant_beh
     angle = stand(state, 20.0, rate) - rate * SETTLED_S  # the first stand turns the frame back
     expected = wrap_angle(0.3 + angle - rate * FOLLOW_S)
     assert wrap_angle(state.yaw_des - expected) == pytest.approx(0.0, abs=2e-3 * abs(rate))
+
+
+def test_a_robot_stands_on_although_its_imu_turns() -> None:
+    """It walked, and its operator left. A heading by the IMU would turn the trunk as far."""
+    given = {"team.robots": 1, "planner.kind": "none", "world.seed": 53}
+    config = load(None, given | {"sensors.yaw_drift": 0.05})
+    references = references_of(config)
+    rollout = Rollout(config, None, lambda tick: references(tick) if tick < 1000 else None)
+    settled = imu = 0.0
+
+    def yaw(quat: Any) -> float:
+        w, x, y, z = np.asarray(quat).ravel()
+        return float(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
+
+    for tick in rollout.ticks(16000):
+        if tick.tick in (9000, 15999):
+            settled = yaw(rollout.world.truth().base_quat_wxyz) - settled
+            imu = yaw(rollout.world.states()["r1"].imu_quat_wxyz) - imu
+    assert abs(imu) > np.radians(15.0), "the IMU has drifted meanwhile"
+    assert abs(settled) < np.radians(1.5)
+    assert rollout.world.fallen() == ()

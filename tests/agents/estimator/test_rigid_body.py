@@ -11,17 +11,21 @@ from hypothesis import strategies as st
 from quadriga.agents.controller.swing import foot_velocities
 from quadriga.agents.estimator.payload_friction import add_payload
 from quadriga.agents.estimator.rigid_body import (
+    add_gram,
     cholesky,
     cholesky_solve,
     foot_forces,
     link_table,
+    product,
     reaction_torques,
+    symmetrise,
+    times,
 )
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.robots.a1 import A1
 from quadriga.shared.robots.conventions import GRAVITY, Array
 from quadriga.shared.robots.pinocchio_model import build_pinocchio_model
-from tests.a1 import GEOMETRY, q_stand
+from tests.a1 import GEOMETRY, TOTAL_MASS, q_stand
 from tests.agents.estimator.poses import FEET, GAINS, MODEL, random_pose, terms_of
 
 size = st.integers(1, 18)
@@ -110,6 +114,39 @@ def test_a_stretched_leg_tells_no_force() -> None:
 def test_another_kind_of_robot_is_refused() -> None:
     with pytest.raises(ConfigError, match="four legs with a hip that turns about x"):
         link_table(pin.buildSampleModelHumanoid())
+
+
+def test_the_single_rigid_body_is_the_sum_of_its_links() -> None:
+    """Steiner's theorem over all links in the nominal pose."""
+    data, q = MODEL.createData(), pin.neutral(MODEL)
+    q[7:] = q_stand()
+    pin.forwardKinematics(MODEL, data, q)
+    links = [(MODEL.inertias[i], data.oMi[i]) for i in range(1, MODEL.njoints)]
+    mass = sum(link.mass for link, _ in links)
+    com = sum(link.mass * (place * link.lever) for link, place in links) / mass
+    inertia = np.zeros((3, 3))
+    for link, place in links:
+        d = place * link.lever - com
+        turned = place.rotation @ link.inertia @ place.rotation.T
+        inertia += turned + link.mass * (d @ d * np.eye(3) - np.outer(d, d))
+    assert mass == pytest.approx(GAINS.body_mass, abs=1e-12)
+    assert mass == pytest.approx(TOTAL_MASS, abs=5e-4)
+    np.testing.assert_allclose(GAINS.com, com, atol=1e-12)
+    np.testing.assert_allclose(GAINS.inertia_inverse @ inertia, np.eye(3), atol=1e-9)
+
+
+@given(m=size, k=size, n=size, seed=st.integers(0, 2**32 - 1))
+@settings(deadline=None)
+def test_products(m: int, k: int, n: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    A, B, x = rng.normal(size=(m, k)), rng.normal(size=(k, n)), rng.normal(size=k)
+    np.testing.assert_allclose(times(A, x), A @ x, atol=1e-12)
+    np.testing.assert_allclose(times(B.T, x), B.T @ x, atol=1e-12)
+    np.testing.assert_allclose(product(A, B), A @ B, atol=1e-12)
+    H = np.zeros((k, k))
+    add_gram(2.5, A, H)
+    symmetrise(H)
+    np.testing.assert_allclose(H, 2.5 * A.T @ A, atol=1e-12)
 
 
 @given(n=size, m=size, seed=st.integers(0, 2**32 - 1))

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from quadriga.shared import codes
 from quadriga.shared.codec import encode
 from quadriga.shared.errors import ConfigError
-from quadriga.shared.messages import Event, State
+from quadriga.shared.messages import Command, Event, State
 from quadriga.shared.robots.conventions import Array
 from quadriga.shared.robots.registry import ROBOTS
 from quadriga.sim_server.world.faults import (
@@ -58,6 +58,21 @@ def test_a_fault_names_robot_component_kind_and_time() -> None:
 def test_a_wrong_fault_names_the_key_and_what_is_wrong(text: str, message: str) -> None:
     with pytest.raises(ConfigError, match=rf"^world\.faults: .*{message}"):
         parse_faults(text, NAMES, NAMED)
+
+
+@pytest.mark.parametrize("kind", ROBOTS)
+def test_parts_of_a_component_are_disjoint_and_within_its_message(kind: str) -> None:
+    for name, parts in build_components(ROBOTS[kind]).items():
+        columns = np.concatenate([part.columns for part in parts])
+        sizes = {State: State.CUTS["foot_force"].stop, Command: Command.CUTS["kd"].stop}
+        (message,) = {part.message for part in parts}
+        assert len(set(columns)) == len(columns), name
+        assert columns.min() >= 0
+        assert columns.max() < sizes[message]
+        for part in parts:
+            assert part.low.shape == part.high.shape == part.columns.shape
+            assert np.all(part.low <= part.high)
+            assert part.wrong(np.linspace(0.1, 0.9, len(part.columns))).shape == part.columns.shape
 
 
 def test_a_wrong_motor_gives_the_opposite_torque() -> None:

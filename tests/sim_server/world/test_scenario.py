@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.robots.conventions import JOINT_NAMES, robot_names
@@ -142,6 +144,15 @@ def test_pushes_are_parsed() -> None:
 def test_a_wrong_text_names_the_key_and_what_is_wrong(key: str, text: str, message: str) -> None:
     with pytest.raises(ConfigError, match=rf"^world\.{key}: .*{message}"):
         built(3, **{key: text})
+
+
+@given(st.text(alphabet="rall0123:.,- e", max_size=30))
+def test_any_text_is_parsed_or_refused(text: str) -> None:
+    try:
+        pushes = parse_pushes(text, NAMES)
+    except ConfigError:
+        return  # anything else fails the test
+    assert len(pushes) == (text.count(",") + 1 if text else 0)
 
 
 def series(seed: int = 0, **world: Any) -> tuple[Push, ...]:

@@ -209,3 +209,10 @@ def test_yaw_drifts_about_the_vertical_whatever_the_attitude() -> None:
     turn = pin.log3(turned @ R.T)
     np.testing.assert_allclose(turn[:2], 0.0, atol=1e-12)
     assert abs(turn[2]) > 0.01
+
+
+def test_errors_of_sensors_change_no_noise() -> None:
+    """A robot's gyro and torques are the same numbers with ideal and with realistic sensors."""
+    ideal, real = record(replace(CONFIG, accel_bias=REAL.accel_bias), 70), record(REAL, 70)
+    for name in ("v_joint", "tau_joint", "imu_gyro", "imu_accel"):
+        np.testing.assert_array_equal(ideal[name], real[name])

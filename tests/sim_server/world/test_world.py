@@ -106,6 +106,22 @@ def test_accelerometer_reads_gravity_at_rest_and_nothing_in_free_fall() -> None:
     assert not world.states()["r1"].foot_force.any()
 
 
+def test_motor_law_is_followed_and_limited() -> None:
+    world = World(configured(1))
+    stand(world, 10)
+    random = np.random.default_rng(0)
+    low = np.array([[-40.0], [-2.0], [-3.0], [0.0], [0.0]])
+    high = np.array([[40.0], [2.0], [3.0], [20.0], [2.0]])
+    tau, q_des, v_des, kp, kd = random.uniform(low, high, (5, N_JOINTS))
+    before = world.states()["r1"]
+    world.step({"r1": command(tau=tau, q_des=q_des, v_des=v_des, kp=kp, kd=kd)})
+    wanted = tau + kp * (q_des - before.q_joint) + kd * (v_des - before.v_joint)
+    assert (np.abs(wanted) > TORQUE_LIMIT).any()
+    expected = np.clip(wanted, -TORQUE_LIMIT, TORQUE_LIMIT)
+    np.testing.assert_allclose(world.states()["r1"].tau_joint, expected, atol=1e-12)
+    np.testing.assert_allclose(world.physics.qfrc_applied[6:], expected, atol=1e-12)
+
+
 def test_a_weak_motor_gives_its_share_of_the_torque_from_its_time_on() -> None:
     config = configured(2, motor_strength="r2:RL_calf:0.01:0.4")
     world, sound = World(config), World(configured(2))
@@ -255,3 +271,9 @@ def own(world: World, robot: str) -> Array:
     truth = world.truth()
     place: Array = truth.base_pos[truth.robots.index(robot)]
     return place
+
+
+def test_yokes_are_those_between_the_robots_that_are_there() -> None:
+    chain = configured(3, yokes="chain")
+    assert World(chain, ("r2", "r3")).team.yokes == ((0, 1),)
+    assert World(chain, ("r1", "r3")).team.yokes == ()
