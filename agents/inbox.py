@@ -48,6 +48,7 @@ Due = tuple[Source, Order]  # a message of a source, and all before it
 UNREADABLE: Final = "unreadable"  # reason of a stop whose message does not decode
 ANYONE: Final = "anyone"  # who stopped the team, released a stop or had it go on
 _NEVER: Final = (-1, 0)
+_HELD: Final = 256  # messages of one source beyond those of the stand; more can only be a flood
 _ASKED_FOR: Final = frozenset(topic.name for topic in REQUESTS)
 
 
@@ -67,8 +68,8 @@ class Inbox:
         topics: row of the table and sender of every key that it subscribes to.
         counters: refused messages, states passed over and waits given up, by name.
         received: valid messages by topic and sender.
-        refused: whether a valid message that is no state was refused: it is of a time too far
-            ahead.
+        refused: whether a valid message that is no state was refused: too many were held, or it
+            is of a time too far ahead.
         ended: whether the end of the walk has been announced, and time has not gone on since, but
             for what plants of single robots may be apart.
     """
@@ -103,6 +104,8 @@ class Inbox:
         self._apart_ms = round(1e3 * config.bus.clock_timeout) if apart else 0
         self._newest: dict[Source, Order] = {}
         self._held: defaultdict[Source, list[Any]] = defaultdict(list)
+        # In lock-step nobody asks for what peers measure while they stand until they walk.
+        self._most = _HELD + config.gait.stand_ms // SAMPLE_MS
         self._step_ms = step_ms(config)
         self._newest_state = -1  # its tick
         self._measurable = measured_limits(config.robot)
@@ -142,6 +145,9 @@ class Inbox:
             self.counters[f"ahead_{topic.name}"] += 1
             self.refused = True
             return
+        elif len(self._held[source]) >= self._most:
+            self.counters[f"flooded_{topic.name}"] += 1
+            self.refused = True
         else:
             self._held[source].append(message)
             self._newest[source] = max(self._newest.get(source, _NEVER), order_of(message))

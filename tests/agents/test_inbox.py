@@ -219,6 +219,34 @@ def test_an_emergency_stop_and_the_end_are_never_held_back() -> None:
     assert box.ended
 
 
+def test_a_flood_is_bounded_and_counted() -> None:
+    box = arrivals()
+    feed(box, ("r2/state", standing(19_999)), ("r2/state", standing(20_000)))
+    feed(box, *(("r1/measurement", measurement(10 * k)) for k in range(1000)))
+    most = 256 + 300 // 10  # what is measured while the team stands belongs to no flood
+    assert box.counters["flooded_measurement"] == 1000 - most
+    feed(box, ("r3/measurement", measurement(0)))
+    assert box.received["measurement", "r3"] == 1
+    assert box.counters["flooded_measurement"] == 1000 - most, "nobody pays for another's flood"
+    taken = box.pop_inputs(standing(5000), Expected(measurement_tick=10**6))
+    assert len(taken.measurements) == most + 1
+    feed(box, *(("r1/measurement", measurement(10 * k)) for k in range(1000, 1000 + most)))
+    assert box.counters["flooded_measurement"] == 1000 - most, "there is room again"
+
+
+@pytest.mark.parametrize(("robots", "stand_ms"), [(10, 300), (3, 10_000)])
+def test_nothing_that_is_measured_during_the_stand_is_refused(robots: int, stand_ms: int) -> None:
+    """In lock-step nobody asks for it before the first planning step."""
+    config = load(None, {"team.robots": robots, "gait.stand_ms": stand_ms})
+    peers = [f"r{k}" for k in range(2, robots + 1)]
+    box, last = Inbox(config, "r1", peers), stand_ms + 10
+    feed(box, ("r1/state", standing(last - 1)), ("r1/state", standing(last)))
+    for peer in peers:
+        feed(box, *((f"{peer}/measurement", measurement(t)) for t in range(10, last + 1, 10)))
+    assert not box.refused
+    assert not box.missing_sources(last, Expected(measurement_tick=last))
+
+
 @pytest.mark.parametrize(
     "change", [{"vx": 50.0}, {"vy": -0.6}, {"wz": 1.01}, {"height": 5.0}, {"height": 0.0}]
 )

@@ -174,6 +174,7 @@ def handed_over(mode: str, log: AgentLog) -> list[StepInputs]:
     seed=st.integers(0, 1 << 32),
     late=st.sampled_from([0.0, 0.05, 0.5]),
     skipped=st.sampled_from([0.0, 0.02, 0.5]),
+    held=st.sampled_from([256, 20, 7]),
     second=st.lists(
         st.tuples(st.sampled_from([55, 145, 235, 325]), st.integers(1, 300)),
         max_size=4,
@@ -190,10 +191,12 @@ def test_a_replay_takes_in_what_the_agent_took_in(
     seed: int,
     late: float,
     skipped: float,
+    held: int,
     second: list[tuple[int, int]],
     early: list[tuple[int, int]],
 ) -> None:
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("quadriga.agents.inbox._HELD", held)
         patch.setattr("quadriga.agents.inbox.AHEAD_MS", 100)
         log, taken = simulate_walk(mode, seed, late, skipped, second, early)
         patch.undo()
