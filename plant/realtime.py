@@ -55,7 +55,7 @@ def _check_others(server: PlantServer) -> None:
     present = server.bus.members_at(HERE)
     if not server.plant.is_robot:  # a bridge sees to its robot itself
         server.end_without(set(server.plant.names) - present, "gone")
-    server.time.look(present, server.plant.tick, server.bus.standstill.note)
+    server.time.look(present, server.plant.tick)
 
 
 def _choose_commands(

@@ -146,7 +146,7 @@ def _note_end(parts: Parts, session: Session) -> ProcessError | None:
     if loss is None:
         return None
     tick = max(parts.last_tick(), 0)
-    error = loss_error(loss, tick, session.loss_ns, session.note)
+    error = loss_error(loss, tick)
     detail, missed = f"{error.name}: {error.got}", str(session.loss_ns)
     parts.note(END, {"code": loss.code, "detail": detail, "tick": str(tick), "missed_ns": missed})
     return error

@@ -73,13 +73,9 @@ class Session:
         self._seen = seen
         self._say(f"recording team {self._bus.team!r} to {self._parts.paths[0]}")
         self._flushed = self._begun = monotonic()
-        still = self._bus.standstill
-        still.begin()
-        starvation, stood = Starvation(self._begun), still.total
+        starvation = Starvation(self._begun)
         while not (self._stopped() or self._ended):
             self._take(max(0.0, self._flushed + FLUSH - monotonic()))
-            if still.total > stood:  # which no priority would have helped
-                starvation, stood = Starvation(monotonic()), still.total
             if starvation.look(monotonic()):
                 self._hurry()
             if late and monotonic() - self._begun > _LOOK and self._parts.messages:
@@ -130,11 +126,6 @@ class Session:
     def find_unannounced(self) -> Loss | None:
         """What has vanished without an announced end of the walk; None if nothing has."""
         return find_loss(self._bus, self._config) if self._seen and not self._announced else None
-
-    @property
-    def note(self) -> str:
-        """What this process has to say of itself where others are missing."""
-        return self._bus.standstill.note
 
     @property
     def loss_ns(self) -> int:

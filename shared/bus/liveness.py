@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-from datetime import UTC, datetime
 from typing import Final, NamedTuple
 
 from quadriga.shared.bus.diagnostics import lead
@@ -15,7 +13,6 @@ from quadriga.shared.errors import ProcessError
 from quadriga.shared.members import has_lead
 from quadriga.shared.runtime.clock import monotonic, wall_ns
 
-_MISSED: Final = re.compile(r", missed since (\S+Z),")
 LAST_PACKETS: Final = 1.0  # s wall, in which what was sent before may still arrive
 
 
@@ -43,29 +40,13 @@ def find_loss(bus: Bus, config: Config) -> Loss | None:
     return None
 
 
-def loss_error(loss: Loss, tick: int, missed_ns: int = 0, note: str = "") -> ProcessError:
-    """The error of a process that ends because of a loss at a tick, ms.
-
-    `missed_ns` is when it was missed first, ns since 1970; 0: unknown. `note`: see `Standstill`.
-    """
+def loss_error(loss: Loss, tick: int) -> ProcessError:
+    """The error of a process that ends because of a loss at a tick, ms."""
     cause = "killed, failed, or cut off: see what it says itself"
     if loss.code == LINK_LOST:
         cause = "the router was killed, the network is gone, or a certificate has expired"
     got = f"none any more after {tick / 1000:.3f} s of the walk"
-    if missed_ns:
-        moment = datetime.fromtimestamp(1e-9 * missed_ns, UTC)
-        got += f", missed since {moment.isoformat(timespec='milliseconds')[:-6]}Z"
-    return ProcessError(
-        loss.what, got, "it to be there until the walk's announced end", cause + note
-    )
-
-
-def missed_ns_of(line: str) -> int:
-    """When something was missed, ns since 1970, of a line with a `loss_error`; 0 of any other."""
-    found = _MISSED.search(line)
-    if found is None:
-        return 0
-    return 1_000_000 * round(1e3 * datetime.fromisoformat(found[1]).timestamp())
+    return ProcessError(loss.what, got, "it to be there until the walk's announced end", cause)
 
 
 class LossTimer:
@@ -132,8 +113,7 @@ class Liveness:
         """
         loss = self._timer.poll()
         if loss is not None:
-            note = self._bus.standstill.note
-            raise loss_error(loss, max(tick, 0), self._timer.missed_ns, note)
+            raise loss_error(loss, max(tick, 0))
 
     def receive(self) -> None:
         """Something has arrived: the team walks."""

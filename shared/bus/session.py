@@ -26,7 +26,6 @@ from quadriga.shared.bus.settings import (
     opening_error,
     router_settings,
 )
-from quadriga.shared.bus.standstill import Standstill
 from quadriga.shared.config.sections import BusConfig
 from quadriga.shared.errors import BusError
 from quadriga.shared.members import ROUTER
@@ -85,7 +84,6 @@ class Bus:
 
     Attributes:
         oversized: payloads that were dropped because of their size so far.
-        standstill: how long this process has not run.
     """
 
     def __init__(self, session: zenoh.Session, team: str, name: str) -> None:
@@ -96,7 +94,7 @@ class Bus:
         self._inbox: Mailbox[zenoh.Sample] = Mailbox(_INBOX)
         self._tokens: set[tuple[str, str, str]] = set()  # of others: name, stage, session
         self._declared: dict[str, zenoh.LivelinessToken] = {}
-        self._closed, self.oversized, self.standstill = False, 0, Standstill()
+        self._closed, self.oversized = False, 0
         tokens, ack = f"{team}/*/*/*", f"{team}/{name}/{RECEIVED}"
         # Zenoh drops publishers and subscribers nobody refers to.
         self._declarations: list[Any] = [
@@ -267,21 +265,16 @@ class Bus:
 
     def get(self, timeout: float) -> Packet | None:
         """The oldest packet of the inbox, waiting at most `timeout` seconds for one."""
-        self.standstill.look()
         sample = self._inbox.take(timeout)
-        self.standstill.look()
         return None if sample is None else _packet(sample)
 
     def drain(self) -> list[Packet]:
         """Everything in the inbox, oldest first, without waiting."""
-        self.standstill.look()
         return [_packet(sample) for sample in self._inbox.drain()]
 
     def declare(self, stage: str) -> None:
         """Tell everyone that this process has reached `stage`; again has no effect."""
         if stage not in self._declared:
-            if stage == READY:
-                self.standstill.begin()
             key = f"{self.team}/{self.name}/{stage}/{self._me}"
             self._declared[stage] = self._session.liveliness().declare_token(key)
 

@@ -318,7 +318,7 @@ def test_a_full_file_system_is_named(start: Start, world: Bus, tmp_path: Path) -
 
 @pytest.mark.parametrize("lost", [0, 7])
 def test_at_once_waits_for_no_team(config: Config, start: Start, tmp_path: Path, lost: int) -> None:
-    """Lost messages are a failure; who was frozen meanwhile says so."""
+    """Lost messages are a failure."""
     with Bus.open(config.bus, "band", SIM) as hub:  # it never says that it is there
         recorder = start(hub, "--now")
         plan = Plan(40, 40, 1, np.zeros((25, 12)), np.zeros((25, 6)), "solved", {}, 0)
@@ -328,15 +328,14 @@ def test_at_once_waits_for_no_team(config: Config, start: Start, tmp_path: Path,
         await_recorded(tmp_path / "run.mcap", 3)
         if lost:
             recorder.send_signal(signal.SIGSTOP)
-            sleep(2.5)
+            sleep(0.5)
             recorder.send_signal(signal.SIGCONT)
         hub.publisher("band/r1/state")(encode(state(11 + lost)))
         await_recorded(tmp_path / "run.mcap", 4)
         recorder.terminate()
-        out, err = recorder.communicate(timeout=WAIT)
+        out, _ = recorder.communicate(timeout=WAIT)
     assert recorder.returncode == bool(lost)
     assert f"4 messages, {lost} lost" in out
-    assert not lost or "this process stood still for" in err
     assert len(list(Recording(tmp_path / "run.mcap").entries())) == 4
 
 
