@@ -121,7 +121,7 @@ def test_each_process_is_told_with_what_is_wrong_with_it(
     }
     said = {m["name"]: m for m in report["members"]}
     assert said["r1"]["diagnoses"][1]["text"] == (
-        "another configuration: world.seed 4, sim has world.seed 0"
+        "another configuration: world.seed=4, sim has world.seed=0"
     )
     (process,) = said["r1"]["processes"]
     assert (process["pid"], process["stage"], process["predictor"]) == (
@@ -167,9 +167,9 @@ def test_a_process_with_another_configuration_does_not_walk(make_team: Make) -> 
         pytest.raises(ProcessError) as caught,
     ):
         running.watch(lambda: False)
-    mu = f"controller.mu {team.config.controller.mu}"
+    mu = f"controller.mu={team.config.controller.mu}"
     assert "process operator: got exit status 2" in str(caught.value)
-    assert f"configuration: controller.mu 0.31, sim has {mu}," in str(caught.value)
+    assert f"configuration: controller.mu=0.31, sim has {mu}," in str(caught.value)
     assert BEGUN not in team.log("sim")
 
 

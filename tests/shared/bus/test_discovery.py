@@ -107,7 +107,7 @@ def test_a_process_says_who_it_is_and_how_far(config: Config, buses: dict[str, B
     assert stages == {**dict.fromkeys(NAMES, "warming-up"), "operator": "ready"}
     assert view.lead is not None
     assert view.planner is not None
-    assert (view.lead.name, view.planner.predictor) == ("sim", "ab" * 32)
+    assert (view.lead.name, view.planner.name) == ("sim", "r1")
 
 
 @pytest.mark.parametrize("of", ["configuration", "predictor"])
@@ -120,7 +120,7 @@ def test_who_differs_leaves_and_the_right_one_takes_its_place(
     said = {"r1": ProcessInfo(buses["r1"], config, digests["r1"])}
     met = all_meet(config, buses, **said, r2=ProcessInfo(buses["r2"], other, digests["r2"]))
     differs = {
-        "configuration": "world.seed 4, sim has world.seed 0",
+        "configuration": "world.seed=4, sim has world.seed=0",
         "predictor": f"{'b' * 12}, r1 has {'a' * 12}",
     }
     with pytest.raises(BusError, match=f"^r2 of team 'team': got another {of}: {differs[of]}, exp"):
