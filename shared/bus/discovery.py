@@ -142,8 +142,8 @@ def read_about(name: str, payload: bytes) -> About | None:
         about = decode(payload, About)
     except MessageError:
         return None
-    texts = (about.host, about.version, about.code, about.predictor, *about.config, *about.sees)
-    plain = all(text.isprintable() for text in texts)
+    texts = (about.host, about.version, about.code, about.predictor)
+    plain = all(map(str.isprintable, (*texts, *about.config, *about.messages, *about.sees)))
     return about if plain and about.name == name and about.stage in STAGES else None
 
 
