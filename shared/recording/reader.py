@@ -1,7 +1,7 @@
 """Reading MCAP recordings of all traffic, whole ones and such that are cut.
 
-`quadriga.shared.recording.recover` reads what is left of a damaged one. Whatever MCAP allows is
-read: chunks that are packed or not, records outside of any, checksums and index that are left out.
+`quadriga.shared.recording.recover` reads what is left of a damaged one. Files are read as the
+recorder writes them: messages in packed chunks, with checksums and an index.
 """
 
 from __future__ import annotations
@@ -41,11 +41,10 @@ CORRUPT: Final = (
 
 _MESSAGE: Final = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log, publish
 _LATEST: Final = (1 << 63) - 1  # ns: what MCAP has 64 bits for, tables have 63 and a sign
-BARE: Final = (Opcode.CHANNEL, Opcode.MESSAGE)  # in chunks, and outside of any
 _RECOVER: Final = "`quadriga recover` writes what is readable"
 _MEND: Final = f"one cut or damaged in its first bytes: {_RECOVER}"
-_DATA_END: Final = RECORD.size + 4  # bytes
-_FOOTER: Final = RECORD.size + 20  # bytes
+_DATA_END: Final = struct.Struct("<BQI")  # the record before the index: opcode, length, checksum
+_FOOTER: Final = 20  # bytes of its content
 
 
 class ChunkEntry(NamedTuple):
@@ -109,11 +108,10 @@ class Recording:
             try:
                 if opcode == Opcode.CHUNK:
                     yield from messages_of(content_of(content), wanted, names, keys)
-                elif opcode in BARE:
-                    record = RECORD.pack(opcode, len(content)) + content
-                    yield from messages_of(record, wanted, names, keys)
+                elif opcode == Opcode.MESSAGE:
+                    raise ValueError("messages outside of chunks")
             except CORRUPT as error:
-                self.cut = f"a chunk of {len(content)} bytes is corrupt ({error})"
+                self.cut = f"a record of {len(content)} bytes is corrupt ({error})"
                 return
 
     def messages(self, kind: type[M], robot: str = "") -> Iterator[M]:
@@ -135,27 +133,17 @@ class Recording:
         """
         if not self.complete:
             raise self._damage_error(f"a file that is cut after {self._size:,} bytes")
-        content = np.memmap(self.path, np.uint8, "r").data
-        footer_at = max(self._size - len(MCAP0_MAGIC) - _FOOTER, 0)
-        footer = Footer.read(stream(content[footer_at + RECORD.size :].tobytes()))
-        start = footer.summary_start or footer_at  # 0: no summary
-        data_at = max(start - _DATA_END, 0)
-        data_end = content[data_at:start].tobytes()
-        there = data_end.startswith(RECORD.pack(Opcode.DATA_END, 4))
-        summary_crc = zlib.crc32(content[start : self._size - len(MCAP0_MAGIC) - 4])
-        if not (there and content[footer_at] == Opcode.FOOTER) or footer.summary_crc not in (
-            0,
-            summary_crc,
-        ):
-            raise self._damage_error("an index that fails its checksum")
-        crc = int.from_bytes(data_end[RECORD.size :], "little")
-        if crc and zlib.crc32(content[:data_at]) != crc:
-            raise self._damage_error("content that fails its checksum")
-        if not crc:  # then those of the chunks must do
-            for _ in self.entries():
-                pass
-            if self.cut:
-                raise self._damage_error(self.cut)
+        content, end = np.memmap(self.path, np.uint8, "r").data, self._size - len(MCAP0_MAGIC)
+        with suppress(*CORRUPT):
+            start = Footer.read(stream(content[end - _FOOTER : end].tobytes())).summary_start
+            data = start - _DATA_END.size
+            data_end = _DATA_END.pack(Opcode.DATA_END, 4, zlib.crc32(content[:data]))
+            summary_end = zlib.crc32(content[start : end - 4]).to_bytes(4, "little")
+            if content[data:start].tobytes() + content[end - 4 : end].tobytes() == (
+                data_end + summary_end
+            ):
+                return
+        raise self._damage_error("content that fails its checksum")
 
     @property
     def notes(self) -> dict[str, dict[str, str]]:
@@ -242,19 +230,15 @@ def content_of(record: bytes) -> bytes:
     """
     chunk = Chunk.read(stream(record))
     size: int = chunk.uncompressed_size
-    if chunk.compression not in ("", "lz4", "zstd") or size > LARGEST_CHUNK:
+    if chunk.compression not in ("lz4", "zstd") or size > LARGEST_CHUNK:
         raise ValueError(f"{size} bytes packed with {chunk.compression[:16]!r}")
-    content: bytes = chunk.data
+    content: bytes
     if chunk.compression == "lz4":
         unpack = lz4.frame.LZ4FrameDecompressor()
         content = unpack.decompress(chunk.data, max_length=size + 1)
-    elif chunk.compression:
-        if zstandard.frame_content_size(chunk.data) not in (size, -1):
-            raise ValueError(f"a frame that does not unpack to {size} bytes")  # nor is allocated
+    else:
         content = zstandard.ZstdDecompressor().decompress(chunk.data, max_output_size=size)
-    if len(content) != size:
-        raise ValueError(f"{len(content)} bytes where {size} were packed")
-    if chunk.uncompressed_crc and zlib.crc32(content) != chunk.uncompressed_crc:
+    if len(content) != size or zlib.crc32(content) != chunk.uncompressed_crc:
         raise ValueError("its checksum is wrong")
     return content
 

@@ -1,10 +1,9 @@
-"""What is left of a damaged recording: intact chunks, records outside of any, the metadata."""
+"""What is left of a damaged recording: intact chunks and the metadata."""
 
 from __future__ import annotations
 
 import mmap
 import re
-import zlib
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
@@ -18,7 +17,6 @@ from mcap.writer import MCAP0_MAGIC
 from quadriga.shared.errors import RecordingError, name_file_errors
 from quadriga.shared.recording.metadata import CHANNELS, PROFILE, unseal
 from quadriga.shared.recording.reader import (
-    BARE,
     CORRUPT,
     RECORD,
     ChunkEntry,
@@ -29,11 +27,8 @@ from quadriga.shared.recording.reader import (
 )
 
 _HEAD: Final = re.compile(rb"(?s)[\x01-\x0f\x80-\xff].{4}\0{4}")  # of a record below 4 GiB
-_ANY_CHUNK: Final = (  # what one begins with; not packed, both sizes in it are the same
-    rb"(?s)\x06.{4}\0{4}.{16}(?!\0{8})(.{8}).{4}(?:\0{4}\1|\x03\0{3}lz4|\x04\0{3}zstd)"
-)
-_KEPT: Final = re.compile(_ANY_CHUNK + rb"|\x0c.{4}\0{4}")  # or metadata
-_BARE_KEPT: Final = re.compile(rb"(?s)[\x04\x05\x0c].{3}\0{5}")  # in a file without chunks
+# What a packed chunk begins with, or metadata.
+_KEPT: Final = re.compile(rb"(?s)\x06.{4}\0{4}.{28}(?:\x03\0{3}lz4|\x04\0{3}zstd)|\x0c.{4}\0{4}")
 _HEADER: Final = 64  # bytes within which a file's header names the program that wrote it
 _CUT: Final = "the file ends in the middle"
 
@@ -62,8 +57,7 @@ class Damage:
 class DamagedRecording:
     """A damaged recording, read as far as it can be.
 
-    Where no record begins, the next intact chunk, or metadata, is looked for. Messages outside
-    chunks have no checksum: in a file that has chunks, none is believed after such a place.
+    Where no record begins, the next intact chunk, or metadata, is looked for.
 
     Attributes:
         metadata: what the writer was given, {} if no copy of it is intact.
@@ -88,13 +82,10 @@ class DamagedRecording:
                 self._file = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
             except ValueError:
                 raise RecordingError(str(path), "an empty file", "a recording") from None
-        self._chunked = re.search(_ANY_CHUNK, self._file) is not None
-        self._pieces = list(self._scan())
+        self._chunks = list(self._scan())
         self._scanned = tuple(self.damages)
-        named = any(name.startswith(PROFILE) for name in self.notes)
-        if self.metadata or named or PROFILE.encode() in self._file[:_HEADER]:
-            return
-        if not any(name_of(entry.key) for entry in self.entries()):
+        ours = self.metadata or PROFILE.encode() in self._file[:_HEADER]
+        if not ours and not any(name_of(entry.key) for entry in self.entries()):
             raise RecordingError(
                 str(path),
                 f"{len(self._file):,} bytes that hold nothing of a recording",
@@ -105,18 +96,16 @@ class DamagedRecording:
     def entries(self) -> Iterator[ChunkEntry]:
         """Every message that can be read, in the order of the file."""
         self.damages = list(self._scanned)
-        keys = self._noted | self._indexed_keys()
-        for at, end in self._pieces:
+        keys = dict(self._noted)
+        for at, end in self._chunks:
             try:
-                bare = self._file[at] in BARE
-                content = self._file[at + (0 if bare else RECORD.size) : end]
-                yield from messages_of(content if bare else content_of(content), keys)
+                yield from messages_of(content_of(self._file[at + RECORD.size : end]), keys)
             except CORRUPT as error:  # of another program: its checksum is right
                 self.damages.append(Damage(at, end - at, f"a foreign chunk ({error})"))
         self.damages.sort(key=lambda damage: damage.at)
 
     def _scan(self) -> Iterator[tuple[int, int]]:
-        """Begin and end of all that holds messages. Notes damages, and metadata as they pass by."""
+        """Begin and end of all chunks. Notes damages, and metadata as they pass by."""
         file, size = self._file, len(self._file)
         at = min(len(MCAP0_MAGIC), size)
         if file[:at] != MCAP0_MAGIC:
@@ -124,8 +113,7 @@ class DamagedRecording:
         done = size - len(MCAP0_MAGIC) if file[-len(MCAP0_MAGIC) :] == MCAP0_MAGIC else size
         while at < done:
             end = self._end_of(at)
-            believed = file[at] in BARE and not (self._chunked and self.damages)
-            if end and (file[at] == Opcode.CHUNK or believed):
+            if end and file[at] == Opcode.CHUNK:
                 yield at, end
             at = end or self._pass_damage(at, done)
         if done == size and not (self.damages and self.damages[-1].what == _CUT):
@@ -150,8 +138,7 @@ class DamagedRecording:
 
     def _pass_damage(self, at: int, done: int) -> int:
         """Where the next record begins after a byte at which none that is intact does."""
-        kept = _KEPT if self._chunked else _BARE_KEPT
-        starts = (found.start() for found in kept.finditer(self._file, at + 1))
+        starts = (found.start() for found in _KEPT.finditer(self._file, at + 1))
         end = next((start for start in starts if self._end_of(start)), done)
         what = "no record begins here"
         if end == done == len(self._file):
@@ -179,15 +166,3 @@ class DamagedRecording:
                 self._noted |= {int(channel): key for channel, key in values.items()}
             return True
         return False
-
-    def _indexed_keys(self) -> dict[int, str | None]:
-        """Keys by channel from the index at the file's end, if that is intact."""
-        file, end = self._file, len(self._file) - len(MCAP0_MAGIC)
-        keys: dict[int, str | None] = {}
-        with suppress(*CORRUPT):
-            footer = records.Footer.read(stream(file[end - 20 : end]))
-            start = footer.summary_start
-            if 0 < start < end and zlib.crc32(file[start : end - 4]) == footer.summary_crc:
-                for _ in messages_of(file[start : end - 20 - RECORD.size], keys):
-                    pass
-        return keys

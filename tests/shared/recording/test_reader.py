@@ -10,7 +10,7 @@ import pytest
 from mcap.reader import make_reader
 from mcap.records import Chunk, DataEnd, Footer
 from mcap.stream_reader import StreamReader
-from mcap.writer import Writer
+from mcap.writer import CompressionType, Writer
 
 from quadriga.shared.codec import encode
 from quadriga.shared.errors import RecordingError
@@ -177,7 +177,7 @@ def test_a_chunk_whose_checksum_is_right_but_which_holds_no_records_ends_the_rea
     """As another program, or somebody with bad intentions, might write one."""
     path = tmp_path / "run.mcap"
     with path.open("xb") as file:
-        out = Writer(file)
+        out = Writer(file, compression=CompressionType.LZ4)
         out.start(PROFILE)
         out.add_metadata(PROFILE, seal(METADATA))
         channel = out.register_channel("team/reference", "msgpack", 0)
