@@ -25,7 +25,7 @@ from quadriga.shared.bus.diagnostics import (
     processes,
     refuse,
 )
-from quadriga.shared.bus.session import HERE, READY, Bus, absence_error, pause
+from quadriga.shared.bus.session import HERE, READY, Bus, pause
 from quadriga.shared.bus.settings import describe_way
 from quadriga.shared.codec import decode, encode
 from quadriga.shared.config.sections import Config
@@ -229,7 +229,12 @@ def await_members(
             if late:
                 # Only now: to try the way may take a second in which a robot is not attended.
                 way = "" if view.linked else f"; {describe_way(config.bus, bus.name)}"
-                raise absence_error(bus, stage, absent, wanted, timeout, reasons + way)
+                raise BusError(
+                    f"barrier of team {bus.team!r}, seen by {bus.name}",
+                    f"no {', '.join(sorted(absent))} at stage {stage!r} after {timeout:g} s",
+                    ", ".join(sorted(wanted)),
+                    reasons + way,
+                )
             if reasons != logged:
                 log(f"{bus.name} waits; {reasons}")
             due, logged = monotonic() + _EVERY, reasons

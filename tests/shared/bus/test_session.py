@@ -226,11 +226,10 @@ def test_presence_comes_and_goes_by_stage(opened: Open) -> None:
     wait_until(lambda: not sim.members_at(HERE) | sim.members_at(READY))
 
 
-def test_a_barrier_names_the_absent_and_two_of_one_name_are_noticed(opened: Open) -> None:
+def test_who_is_absent_and_two_of_one_name_are_noticed(opened: Open) -> None:
     sim, first, second = opened("sim"), opened("r1"), opened("r1")
     first.declare(HERE)
-    with pytest.raises(BusError, match=r"no r2, recorder at stage 'here' after 0\.5 s"):
-        sim.wait_for(HERE, {"r1", "r2", "recorder"}, 0.5, never)
+    assert not sim.wait_for(HERE, {"r1", "r2"}, 0.2, never)
     assert not sim.wait_for(HERE, {"r2"}, WAIT, lambda: True)
     assert sim.duplicates(HERE) == frozenset()
     second.declare(HERE)
