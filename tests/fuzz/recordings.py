@@ -20,7 +20,6 @@ from quadriga.shared.errors import QuadrigaError
 from quadriga.shared.printable import printable_line
 from quadriga.shared.recording.metadata import PROFILE, seal
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.recording.recover import DamagedRecording
 from quadriga.shared.recording.writer import RecordingWriter
 from quadriga.shared.topics import TABLE
 from tests.fuzz.damage import damage
@@ -75,7 +74,7 @@ class Recordings:
             list(recording.entries())
             recording.require_whole()
         with suppress(QuadrigaError):
-            list(DamagedRecording(self._path).entries())
+            list(Recording(self._path, salvage=True).entries())
         with suppress(QuadrigaError):
             format_findings(check(self._path))
         self._recover()

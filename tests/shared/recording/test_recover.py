@@ -29,7 +29,6 @@ from quadriga.shared.recording.reader import (
     Recording,
     content_of,
 )
-from quadriga.shared.recording.recover import DamagedRecording
 from quadriga.shared.recording.writer import RecordingWriter
 from tests.shared.recording.test_reader import METADATA, command, state
 
@@ -61,7 +60,7 @@ def damaged(original: Path, content: bytes) -> Path:
 
 
 def test_a_whole_file_comes_back_without_damage(original: Path) -> None:
-    salvage = DamagedRecording(original)
+    salvage = Recording(original, salvage=True)
     assert list(salvage.entries()) == entries_of(original)
     assert (salvage.damages, salvage.metadata) == ([], METADATA)
     assert salvage.notes["quadriga.counts"]["messages"] == "1000"
@@ -85,18 +84,12 @@ def test_whatever_happened_to_it_the_rest_is_as_it_was(original: Path, data: st.
         return
     with pytest.raises(RecordingError):
         Recording(path).require_whole()
-    try:
-        salvage = DamagedRecording(path)
-    except RecordingError:
-        assert len(content) < 3000 or b"quadriga" not in content[:64]
-        return
-    assert salvage.metadata in ({}, METADATA)
-    before, found = entries_of(original), list(salvage.entries())
-    assert not Counter(found) - Counter(before)
-    if len(content) == len(whole):
-        assert len(before) - len(found) <= flips * 60  # each costs the chunk it hit, no more
-    with suppress(RecordingError):
-        assert not Counter(Recording(path).entries()) - Counter(before)
+    before = Counter(entries_of(original))
+    for salvage in (True, False):
+        with suppress(RecordingError):
+            recording = Recording(path, salvage=salvage)
+            assert recording.metadata in ({}, METADATA)
+            assert not Counter(recording.entries()) - before
 
 
 def test_a_bad_chunk_is_named_and_skipped(original: Path) -> None:
@@ -104,13 +97,15 @@ def test_a_bad_chunk_is_named_and_skipped(original: Path) -> None:
     chunks = [found.end() for found in re.finditer(rb"\x03\0\0\0lz4", content)]
     at = chunks[1] + 100  # among the messages of the second chunk; the last ones are its index
     content[at] ^= 1
-    salvage = DamagedRecording(damaged(original, bytes(content)))
+    salvage = Recording(damaged(original, bytes(content)), salvage=True)
     found = list(salvage.entries())
     assert 900 < len(found) < 1000
     assert found[-1] == entries_of(original)[-1]
     (damage,) = salvage.damages
-    assert damage.what == "a chunk that fails its checksum"
-    assert damage.at <= at < damage.at + damage.size
+    assert "is corrupt (its checksum is wrong)" in damage
+    before = list(Recording(damaged(original, bytes(content))).entries())
+    assert before == found[: len(before)]
+    assert len(before) < 200, "read as a whole one, up to the damage"
 
 
 def test_the_chunk_that_declares_the_channels_is_no_need_of_the_others(tmp_path: Path) -> None:
@@ -123,19 +118,24 @@ def test_the_chunk_that_declares_the_channels_is_no_need_of_the_others(tmp_path:
     content = bytearray((tmp_path / "run.mcap").read_bytes())
     content[content.index(b"\x03\0\0\0lz4") + 100] ^= 1
     writer.finish()
-    found = list(DamagedRecording(damaged(tmp_path / "run.mcap", bytes(content))).entries())
+    found = list(Recording(damaged(tmp_path / "run.mcap", bytes(content)), salvage=True).entries())
     assert [(entry.key, entry.tick) for entry in found] == [
         (key, tick) for tick in range(1, 10) for key in KEYS[:2]
     ]
 
 
-def test_the_metadata_s_copy_stands_in(original: Path) -> None:
+def test_the_metadata_s_copy_stands_in_and_without_one_messages_are_saved(original: Path) -> None:
     content = bytearray(original.read_bytes())
     content[content.index(b"config_sha256") + 20] ^= 1
     path = damaged(original, bytes(content))
+    assert Recording(path).metadata == Recording(path, salvage=True).metadata == METADATA
+    cut = damaged(original, bytes(content[: len(content) // 2]))
     with pytest.raises(RecordingError, match="metadata that fail their checksum"):
-        Recording(path)
-    assert DamagedRecording(path).metadata == METADATA
+        Recording(cut)
+    assert Recording(cut, salvage=True).metadata == {}
+    found = list(Recording(cut, salvage=True).entries())
+    assert found == entries_of(original)[: len(found)]
+    assert len(found) > 400
 
 
 def test_what_is_no_recording_is_refused(original: Path, tmp_path: Path) -> None:
@@ -150,11 +150,11 @@ def test_what_is_no_recording_is_refused(original: Path, tmp_path: Path) -> None
         path = tmp_path / f"{name}.mcap"
         path.write_bytes(content)
         with pytest.raises(RecordingError):
-            DamagedRecording(path)
+            Recording(path, salvage=True)
         with pytest.raises(RecordingError):
             Recording(path)
     with pytest.raises(RecordingError, match="No such file"):
-        DamagedRecording(tmp_path / "no.mcap")
+        Recording(tmp_path / "no.mcap")
 
 
 @pytest.mark.parametrize(
