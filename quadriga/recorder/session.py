@@ -16,7 +16,6 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
 from quadriga.shared.members import PLANNER, plant_name
 from quadriga.shared.messages import Event
-from quadriga.shared.recording.quota import OVERSIZED
 from quadriga.shared.recording.reader import name_of
 from quadriga.shared.recording.ticks import SkippedTicks
 from quadriga.shared.robots.conventions import robot_names
@@ -119,7 +118,6 @@ class Session:
             some = self._take(QUIET)
             if not some and (self.find_unannounced() is None or monotonic() > begun + LAST_PACKETS):
                 break
-        self._parts.quota.refused[OVERSIZED] += self._bus.oversized
         if self._bus.dropped:
             self._say(f"{self._bus.dropped:,} messages were dropped before they were recorded")
 

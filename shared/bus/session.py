@@ -81,9 +81,6 @@ class Bus:
     token `<team>/<name>/<stage>/<session>`: it vanishes within milliseconds when its process dies,
     and the session in it tells two processes of the same name apart. A process's last packets may
     arrive after its token has vanished.
-
-    Attributes:
-        oversized: payloads that were dropped because of their size so far.
     """
 
     def __init__(self, session: zenoh.Session, team: str, name: str) -> None:
@@ -94,7 +91,7 @@ class Bus:
         self._inbox: Mailbox[zenoh.Sample] = Mailbox(_INBOX)
         self._tokens: set[tuple[str, str, str]] = set()  # of others: name, stage, session
         self._declared: dict[str, zenoh.LivelinessToken] = {}
-        self._closed, self.oversized = False, 0
+        self._closed = False
         tokens, ack = f"{team}/*/*/*", f"{team}/{name}/{RECEIVED}"
         # Zenoh drops publishers and subscribers nobody refers to.
         self._declarations: list[Any] = [
@@ -202,20 +199,9 @@ class Bus:
         put: Callable[[bytes], None] = publisher.put
         return put
 
-    def subscribe(self, key: str, *, largest: int = 0) -> None:
-        """Feed what others publish on `key` (may hold `*` and `**`) into the inbox.
-
-        Payloads of more than `largest` bytes (0: any) are dropped as they arrive and counted in
-        `oversized`.
-        """
-
-        def put(sample: zenoh.Sample) -> None:
-            if len(sample.payload) > largest:
-                self.oversized += 1  # by one thread, see `_ONE_RECEIVES`
-            else:
-                self._inbox.put(sample)
-
-        self._hear(key, _direct(put if largest else self._inbox.put))
+    def subscribe(self, key: str) -> None:
+        """Feed what others publish on `key` (may hold `*` and `**`) into the inbox."""
+        self._hear(key, _direct(self._inbox.put))
 
     @property
     def dropped(self) -> int:
