@@ -9,7 +9,7 @@ from typing import Final
 from quadriga.recorder.parts import Parts
 from quadriga.recorder.selection import KeyFilter
 from quadriga.recorder.starvation import Starvation
-from quadriga.shared.bus.liveness import LAST_PACKETS, Loss, LossTimer, find_loss
+from quadriga.shared.bus.liveness import LAST_PACKETS, Loss, find_loss
 from quadriga.shared.bus.session import Bus
 from quadriga.shared.codec import decode
 from quadriga.shared.config.sections import Config
@@ -19,7 +19,7 @@ from quadriga.shared.messages import Event
 from quadriga.shared.recording.reader import name_of
 from quadriga.shared.recording.ticks import SkippedTicks
 from quadriga.shared.robots.conventions import robot_names
-from quadriga.shared.runtime.clock import log_ns, monotonic, sleep
+from quadriga.shared.runtime.clock import log_ns, monotonic, sleep, wall_ns
 from quadriga.shared.runtime.scheduling import take_priority
 from quadriga.shared.topics import EVENT, find_topic
 
@@ -60,7 +60,7 @@ class Session:
         self._ended = self._seen = self._announced = self._drops = False
         self._hurries = config.world.mode == "lockstep"  # then it does from the start
         self._passed_over = SkippedTicks(config)
-        self._losses = LossTimer(bus, config)
+        self._missed_ns = 0
 
     def record(self, *, late: bool, seen: bool) -> None:
         """Record until the end; a late recorder reports what it has once it knows.
@@ -128,7 +128,7 @@ class Session:
     @property
     def loss_ns(self) -> int:
         """When what has vanished was missed first, ns since 1970; 0: all is there."""
-        return self._losses.missed_ns
+        return self._missed_ns
 
     def _take(self, timeout: float) -> bool:
         """Write all that has arrived; False if nothing came within `timeout` seconds."""
@@ -161,9 +161,10 @@ class Session:
         if self._bus.dropped and not self._drops:
             self._drops = True
             self._say("this computer is too busy to record all: messages are dropped from now on")
-        gone = self._losses.poll() is not None
+        gone = find_loss(self._bus, self._config) is not None
+        self._missed_ns = (self._missed_ns or wall_ns()) if gone else 0
         self._ended = self._seen and gone
-        self._seen = self._seen or self._losses.since is None
+        self._seen = self._seen or not gone
 
 
 def _format_missed(first_ticks: Mapping[str, int]) -> str:

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 import pytest
 
 from quadriga.shared.bus import liveness
-from quadriga.shared.bus.liveness import Liveness, LossTimer, find_loss
+from quadriga.shared.bus.liveness import Liveness, find_loss
 from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.codes import LEAD_GONE, LINK_LOST
 from quadriga.shared.config.load import load
@@ -97,16 +97,17 @@ def test_a_link_that_is_gone_is_named_and_not_those_behind_it(mode: str) -> None
 def test_who_is_back_in_time_is_not_missed() -> None:
     config = load(None, {"bus.endpoint": free_endpoint()})
     with together(config) as (sim, r1):
-        timer = LossTimer(r1, config, 0.2)
+        watch = Liveness(r1, config)
         sim.close()
         wait_until(lambda: not r1.members_at(HERE))
-        assert timer.poll() is None
+        watch.poll(1)
         with Bus.open(config.bus, "team", SIM) as again:
             again.declare(HERE)
             wait_until(lambda: r1.members_at(HERE))
             sleep(0.25)
-            assert timer.poll() is None
+            watch.poll(1)
         wait_until(lambda: not r1.members_at(HERE))
-        assert timer.poll() is timer.poll() is None
+        watch.poll(1)
         sleep(0.25)
-        assert timer.poll() == find_loss(r1, config) is not None
+        with pytest.raises(ProcessError):
+            watch.poll(1)
