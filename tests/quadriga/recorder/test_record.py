@@ -24,7 +24,7 @@ from quadriga.shared.config.sections import BusConfig, Config, RecorderConfig, T
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.members import RECORDER, SIM
 from quadriga.shared.messages import Command, Consumed, Plan, Reference
-from quadriga.shared.recording.metadata import LOST, SINCE
+from quadriga.shared.recording.metadata import LOST
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns
 from quadriga.team.endpoint import free_endpoint
@@ -119,7 +119,7 @@ def test_joining_late_says_what_it_missed_and_counts_what_is_lost(
     recording = Recording(tmp_path / "run.mcap")
     recording.require_whole()
     assert recording.notes[LOST] == {"band/r1/state": "11"}
-    assert recording.notes[SINCE] == {"band/r1/state": "4000"}
+    assert next(recording.entries()).tick == 4000
 
 
 def test_commands_of_ticks_that_an_agent_passed_over_are_not_lost(

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
@@ -87,17 +85,6 @@ def test_so_it_is_in_a_folder_that_the_user_names(package: Path, tmp_path: Path)
     for _ in range(2):  # where nothing can be kept each process compiles for itself
         assert run(package, NUMBA_CACHE_DIR="/proc/none") == (3.5, 0)
     assert not list((package / "quadriga/shared/__pycache__").glob("compiled-*"))
-
-
-def test_on_a_full_disk_only_what_is_complete_is_used(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(free=4096))
-    assert jit_cache.compiled_folder.__wrapped__() is None
-    (folder,) = tmp_path.glob("compiled-*")
-    (folder / jit_cache.REHEARSED).touch()
-    assert jit_cache.compiled_folder.__wrapped__() == folder
 
 
 def test_the_sources_are_those_with_compiled_functions_and_what_they_import() -> None:
