@@ -14,9 +14,9 @@ from quadriga.shared.codec import decode, encode
 from quadriga.shared.config.sections import Config
 from quadriga.shared.messages import Command, Message, State
 from quadriga.shared.recording.reader import ChunkEntry, Recording
-from quadriga.shared.runtime.arithmetic import arithmetic, differences
+from quadriga.shared.runtime.arithmetic import arithmetic
 from tests.golden import scenario
-from tests.golden.compare import TOLERANCE, first_difference, judge
+from tests.golden.compare import TOLERANCE, differences, first_difference, judge
 from tests.golden.renew import ARITHMETIC
 from tests.golden.rerun import recorded, rerun
 
