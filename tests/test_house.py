@@ -22,10 +22,10 @@ BUDGETS: Final[Mapping[str, int]] = {
     "plant": 1_145,  # planned: 1,000; left: states and commands over the bus
     "sim_server": 2_640,  # planned: 2,600
     "bridges": 1_950,
-    "shared": 8_300,  # planned: 7,200; left: Unitree's protocols, the barrier, 640 lines of keys
+    "shared": 8_280,  # planned: 7,200; left: Unitree's protocols, the barrier, 640 lines of keys
     "quadriga": 39_735,  # planned: 18,200; left: harnesses of experiments, report, commands
     "benchmarks": 4_300,  # planned: 1,800
-    "tests": 44_010,  # planned: 28,000
+    "tests": 43_990,  # planned: 28,000
 }
 COUNTED: Final = (".py", ".js", ".css", ".html")
 MOST_ARGUMENTS: Final = 8
