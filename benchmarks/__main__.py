@@ -78,7 +78,7 @@ def describe_machine() -> dict[str, Any]:
     """The machine's properties that the figures depend on."""
     from benchmarks.children import result_of
     from quadriga.shared.config.sections import Config
-    from quadriga.shared.runtime.arithmetic import arithmetic
+    from quadriga.shared.runtime.arithmetic import processor
     from quadriga.shared.runtime.scheduling import take_priority
 
     realtime = result_of(
@@ -87,7 +87,7 @@ def describe_machine() -> dict[str, Any]:
     return {
         "date": datetime.fromtimestamp(1e-9 * wall_ns(), UTC).isoformat(timespec="seconds"),
         "cores": len(os.sched_getaffinity(0)),
-        "processor": arithmetic()["cpu"],
+        "processor": processor(),
         "python": platform.python_version(),
         **{name: version(name) for name in _VERSIONS},
         "scheduling": "realtime" if realtime else "ordinary",

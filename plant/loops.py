@@ -18,7 +18,7 @@ from quadriga.plant.commands import CommandTimeout
 from quadriga.plant.deadlines import PERIOD_MS, Deadlines
 from quadriga.plant.protocol import TOLD_TO_STOP, End
 from quadriga.plant.server import PlantServer
-from quadriga.shared.bus.diagnostics import CLOCK_REMEDY, PACE_LIMIT, ClockOffset, lead
+from quadriga.shared.bus.diagnostics import CLOCK_REMEDY, PACE_LIMIT, clock_difference, lead
 from quadriga.shared.bus.discovery import ProcessInfo, ask, ask_clock
 from quadriga.shared.bus.session import HERE, POLL, Bus
 from quadriga.shared.config.sections import Config
@@ -41,7 +41,6 @@ _TICK_NS: Final = 1_000_000
 _LEAST_GAP_NS: Final = _TICK_NS // 2  # between the beginnings of two ticks
 _AHEAD_NS: Final = 500_000_000  # from when T0 is set: all hear of it meanwhile
 _QUIET_NS: Final = 2_000_000  # before T0, in which nothing else is done
-_SAME: Final = ClockOffset(0.0, 0.0)
 
 
 def run_lockstep(server: PlantServer, stopped: Callable[[], bool]) -> End:
@@ -105,9 +104,9 @@ class TeamPace:
         if answer is None:
             cause = "it is frozen or overloaded, or has another version of quadriga"
             raise BusError(name, f"no answer of {self._lead}", "its system clock", cause)
-        offset = _SAME - answer.clock_offset
-        if offset.exceeds(PACE_LIMIT):
-            got, cause = f"{offset} that of {self._lead}", CLOCK_REMEDY
+        ahead, error = answer.clock_offset
+        if off := clock_difference(-ahead, error, PACE_LIMIT):
+            got, cause = f"{off} that of {self._lead}", CLOCK_REMEDY
             raise BusError(name, got, f"{1e3 * PACE_LIMIT:g} ms at most", cause)
 
     def start(self, pause: Callable[[], None], stopped: Callable[[], bool]) -> bool:
@@ -183,7 +182,7 @@ def _check_others(server: PlantServer) -> None:
     present = server.bus.members_at(HERE)
     if not server.plant.is_robot:  # a bridge sees to its robot itself
         server.end_without(set(server.plant.names) - present, "gone")
-    server.time.look(present, server.plant.tick, server.bus.standstill.note)
+    server.time.look(present, server.plant.tick)
 
 
 def _choose_commands(

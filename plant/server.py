@@ -138,7 +138,7 @@ class PlantServer:
             return
         refused = [self.commands.refused[r] for r in sorted(robots) if r in self.commands.refused]
         why += "".join(f", its last command was refused ({each})" for each in refused)
-        detail = f"{', '.join(sorted(robots))} {why}{self.bus.standstill.note}"
+        detail = f"{', '.join(sorted(robots))} {why}"
         self.time.end = End(codes.COMMAND_LOST, detail)
         if not self.time.drives:
             self.announce(codes.COMMAND_LOST, self.plant.names[0], detail)

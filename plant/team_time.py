@@ -79,13 +79,12 @@ class TeamTime:
         if ends:
             self.end = self.end or End(event.code, event.detail)
 
-    def look(self, present: Collection[str], tick: int, note: str) -> None:
+    def look(self, present: Collection[str], tick: int) -> None:
         """Set `end` if a plant on which this one depends is gone, or silent.
 
         Args:
             present: processes that are there.
             tick: this plant's.
-            note: what this process has to say of itself, see `Standstill`.
         """
         gone = {plant for plant in self._plants.values() if plant not in present}
         self._looks_left -= bool(gone)
@@ -93,7 +92,7 @@ class TeamTime:
             self._end_without(gone, "gone")
         oldest = tick - round(1000 * self._timeout)
         silent = {plant for key, plant in self._plants.items() if self._newest[key] < oldest}
-        self._end_without(silent, f"silent for {self._timeout:g} s{note}")
+        self._end_without(silent, f"silent for {self._timeout:g} s")
 
     def _end_without(self, plants: Collection[str], how: str) -> None:
         if plants and self.end is None:

@@ -60,14 +60,6 @@ def run() -> int:
     except QuadrigaError as error:  # of a package that adds to this one
         print(printable_line(f"quadriga: {error}"), file=sys.stderr)
         return _WRONG
-    except Exception:
-        foreign = _find_shadowing_file()
-        if not foreign:
-            raise
-        expected = "no file of the name of a module of Python or of a package that is needed"
-        cause = "rename it, or take its folder out of PYTHONPATH"
-        print(f"quadriga: {foreign}: got imported, expected {expected} ({cause})", file=sys.stderr)
-        return _WRONG
 
     return command_line()
 
@@ -86,24 +78,6 @@ def _forgiving(stream: Any) -> Any:
         line_buffering=stream.line_buffering,
         write_through=unbuffered,
     )
-
-
-def _find_shadowing_file() -> str:
-    """A file that was imported in the place of another module; "": there is none.
-
-    The look at it must not import such files itself.
-    """
-    own = sys.path.index(os.path.dirname(os.__file__))
-    before, sys.path[:] = sys.path[:own], sys.path[own:]
-    theirs = tuple(f"{os.path.abspath(folder)}/" for folder in before)
-    for name, module in [*sys.modules.items()]:
-        if str(getattr(module, "__file__", "")).startswith(theirs):
-            del sys.modules[name]
-    try:
-        from quadriga.shared.runtime.installed import shadowing_files
-    except ImportError:  # this project lies there itself
-        return ""
-    return next(iter(shadowing_files(before)), "")
 
 
 def end(status: int) -> NoReturn:

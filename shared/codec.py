@@ -30,7 +30,6 @@ MAX_TEXT = 4096  # characters
 _MAX_DESCRIPTION: Final = 120
 _HEAD: Final = b"\xa6schema\x01\xa4tick"  # what `encode` writes after the map's own byte
 _STAMP: Final = b"\xa8stamp_ns"
-_TICKS: Final = (0, 1, 128, 256, 4295, 65536, 1 << 32)  # where tick or stamp take more bytes
 _WIDTH: Final = {0xCC: 1, 0xCD: 2, 0xCE: 4, 0xCF: 8}  # MessagePack's unsigned integers
 _FLOAT64: Final = np.dtype("<f8")
 _UNREADABLE: Final = (ValueError, TypeError, msgpack.exceptions.UnpackException)
@@ -162,22 +161,14 @@ class _FlatLayout:
 
     def __init__(self, kind: type[Flat]) -> None:
         self.kind: Any = kind
-        self._cuts = [slice(8 * cut.start, 8 * cut.stop) for cut in kind.CUTS.values()]  # bytes
-        zeros = {name: bytes(8 * (cut.stop - cut.start)) for name, cut in kind.CUTS.items()}
-        empty = msgpack.packb({"schema": kind.SCHEMA, "tick": 0, "stamp_ns": 0, **zeros})
-        self._head: bytes = empty[: 1 + len(_HEAD)]
+        sizes = {name: 8 * (cut.stop - cut.start) for name, cut in kind.CUTS.items()}
+        empty = msgpack.packb({"schema": kind.SCHEMA, "tick": 0})
+        self._head: bytes = bytes([empty[0] + 1 + len(sizes)]) + empty[1:-1]  # of a larger map
         # What precedes the numbers of each field: its name, and how many bytes they are.
-        self._names = tuple(msgpack.packb({n: raw})[1 : -len(raw)] for n, raw in zeros.items())
-        pairs = zip(self._names, zeros.values(), strict=True)
-        fields = "".join(f"{len(name)}s{len(raw)}s" for name, raw in pairs)
-        self._forms = dict(self._form(tick, fields) for tick in _TICKS)
-
-    def _form(self, tick: int, fields: str) -> tuple[int, tuple[Any, ...]]:
-        """How long messages are whose tick and stamp take as many bytes as here, and their form."""
-        (mark, of_tick), (stamp_mark, of_stamp) = map(_integer_form, (tick, 1_000_000 * tick))
-        head, stamp = self._head + mark, _STAMP + stamp_mark
-        form = struct.Struct(f">{len(head)}s{of_tick}{len(stamp)}s{of_stamp}{fields}")
-        return form.size, (form, head, stamp, MAX_TICK if mark else 128)
+        self._names = tuple(msgpack.packb({n: bytes(size)})[1:-size] for n, size in sizes.items())
+        pairs = zip(self._names, sizes.values(), strict=True)
+        self._body = struct.Struct("".join(f"{len(name)}s{size}s" for name, size in pairs))
+        self._cuts = [slice(8 * cut.start, 8 * cut.stop) for cut in kind.CUTS.values()]  # bytes
 
     def write(self, tick: int, stamp_ns: int, row: Array) -> bytes:
         """The message's bytes, those of MessagePack."""
@@ -192,24 +183,15 @@ class _FlatLayout:
 
         None is no judgement: the same fields in another order, for example, are a valid message.
         """
-        if len(payload) not in self._forms:
+        found = _read_head(payload, len(self._head)) if payload.startswith(self._head) else None
+        if found is None:
             return None
-        form, head, stamp, ticks = self._forms[len(payload)]
-        parts = form.unpack(payload)
-        if (parts[0], parts[2], parts[4::2]) != (head, stamp, self._names):
+        tick, stamp_ns, at = found
+        if len(payload) != at + self._body.size or tick >= MAX_TICK or stamp_ns != 1_000_000 * tick:
             return None
-        row = np.frombuffer(bytearray().join(parts[5::2]), _FLOAT64)
-        tick, stamp_ns = parts[1], parts[3]
-        if tick >= ticks or stamp_ns != 1_000_000 * tick or not _all_finite(row):
-            return None
-        return tick, stamp_ns, row
-
-
-def _integer_form(value: int) -> tuple[bytes, str]:
-    """What stands before an integer of this size, and how `struct` calls it."""
-    packed = msgpack.packb(value)
-    size = len(packed) - 1
-    return (packed[:1], {1: "B", 2: "H", 4: "I", 8: "Q"}[size]) if size else (b"", "B")
+        parts = self._body.unpack_from(payload, at)
+        row = np.frombuffer(bytearray().join(parts[1::2]), _FLOAT64)
+        return (tick, stamp_ns, row) if parts[::2] == self._names and _all_finite(row) else None
 
 
 def _read_head(payload: bytes, at: int) -> tuple[int, int, int] | None:

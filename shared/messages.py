@@ -283,7 +283,7 @@ class Event(Message):
     @classmethod
     def of(cls, tick: int, code: str, robot: str, detail: str) -> Event:
         """The announcement of something that happened at `tick`, by its code."""
-        return cls(tick, tick * 1_000_000, EVENTS[code].kind, robot, detail, code)
+        return cls(tick, tick * 1_000_000, EVENTS[code], robot, detail, code)
 
 
 _LINE: Final = re.compile(r"(\d+) ms: (\S+) (\S*) (.*)")  # of an event in a log

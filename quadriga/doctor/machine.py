@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -53,7 +53,6 @@ class MachineReadings:
         receive_buffer: that a socket may ask for, bytes.
         requirements: what this project asks for: `name>=1.0,<2`.
         installed: versions by name of what is asked for.
-        shadowing: files that are imported in the place of what is installed.
     """
 
     realtime: bool | None
@@ -68,7 +67,6 @@ class MachineReadings:
     receive_buffer: int | None
     requirements: tuple[str, ...] | None
     installed: Mapping[str, str]
-    shadowing: Sequence[str] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,24 +173,16 @@ def check_machine(readings: MachineReadings, need: MachineNeed) -> Iterator[Diag
         remedy = f"sudo sysctl -w net.core.rmem_max={RECEIVE_BUFFER}, or recordings may have gaps"
         good = r.receive_buffer >= RECEIVE_BUFFER or not need.realtime
         yield judge("buffer", good, text, NOTE, remedy)
-    yield check_packages(r.requirements, r.installed, r.shadowing)
+    yield check_packages(r.requirements, r.installed)
 
 
-def check_packages(
-    requirements: tuple[str, ...] | None,
-    installed: Mapping[str, str],
-    shadowing: Sequence[str] = (),
-) -> Diagnosis:
+def check_packages(requirements: tuple[str, ...] | None, installed: Mapping[str, str]) -> Diagnosis:
     """Versions that are installed against those that are asked for.
 
     Args:
         requirements: such as `name>=1.0,<2`; None: not known.
         installed: versions by name; what is not installed is not in it.
-        shadowing: files that are imported in the place of what is installed.
     """
-    if shadowing:
-        text = f"imported in the place of what is installed: {', '.join(shadowing)}"
-        return Diagnosis("packages", BAD, text, "rename it, or take its folder out of PYTHONPATH")
     if requirements is None:
         text = "what this project asks for is not known: it is not installed"
         return Diagnosis("packages", UNKNOWN, text)

@@ -17,7 +17,7 @@ from typing import Final, TypeVar
 from packaging.requirements import InvalidRequirement, Requirement
 
 from quadriga.doctor.machine import MachineReadings
-from quadriga.shared.runtime.installed import PROJECT, shadowing_files
+from quadriga.shared.runtime.installed import PROJECT
 from quadriga.shared.runtime.places import cache_dir
 from quadriga.team.run_folder import RUNS
 
@@ -57,7 +57,6 @@ def read_machine() -> MachineReadings:
         receive_buffer=_read(lambda: int(_RECEIVE_BUFFER.read_text(encoding="ascii"))),
         requirements=requirements,
         installed={name: version for name, version in versions.items() if version},
-        shadowing=shadowing_files(),
     )
 
 

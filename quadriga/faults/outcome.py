@@ -38,12 +38,7 @@ class Moment(NamedTuple):
 
 
 def describe_outcome(
-    config: Config,
-    traces: Traces,
-    recording: Recording,
-    moment: Moment,
-    told: Sequence[Event] = (),
-    missed: Sequence[int] = (),
+    config: Config, traces: Traces, recording: Recording, moment: Moment, told: Sequence[Event] = ()
 ) -> dict[str, Any]:
     """The row of a trial.
 
@@ -63,7 +58,6 @@ def describe_outcome(
         recording: it.
         moment: of the fault.
         told: what the world itself has logged: a recording may lack the end.
-        missed: when the others have missed the world, as they have logged it, ns since 1970.
     """
     tick = moment.tick
     if moment.wall_ns:  # by the recorder's clock, which may be what the fault is about
@@ -83,7 +77,7 @@ def describe_outcome(
         "falls": fallen,
         "falls_of_others": sum(name in fallen for name in others),
         "lost": _lost_robots(traces.robots, end),
-        "detect_ms": _first_notice(traces, events, moment, tick, missed),
+        "detect_ms": _first_notice(traces, events, moment, tick),
         "stand_ms": _after(tick, _all_stand(traces.statuses, others, tick)),
         "recover_ms": _after(tick, _all_walk(traces, tick)) if goes_on else None,
         "lost_messages": _count_lost(config, traces, moment),
@@ -107,9 +101,7 @@ def tick_at(recording: Recording, wall_ns: int) -> int:
     return newest
 
 
-def _first_notice(
-    traces: Traces, events: Iterable[Event], moment: Moment, tick: int, missed: Sequence[int]
-) -> int | None:
+def _first_notice(traces: Traces, events: Iterable[Event], moment: Moment, tick: int) -> int | None:
     noticed = [
         status.tick - tick
         for statuses in traces.statuses.values()
@@ -123,13 +115,9 @@ def _first_notice(
         and event.code not in _ANNOUNCED
         and (event.kind == "fault" or event.code == codes.COMMAND_LOST)
     ]
-    if moment.wall_ns:
-        by_recorder = int(traces.notes.get(END, {}).get("missed_ns", "0"))
-        noticed += [
-            round(1e-6 * (ns - moment.wall_ns))
-            for ns in (by_recorder, *missed)
-            if ns >= moment.wall_ns
-        ]
+    missed_ns = int(traces.notes.get(END, {}).get("missed_ns", "0"))
+    if moment.wall_ns and missed_ns >= moment.wall_ns:
+        noticed.append(round(1e-6 * (missed_ns - moment.wall_ns)))
     return min(noticed, default=None)
 
 

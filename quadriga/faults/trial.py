@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import shutil
 import signal
-from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -19,7 +18,6 @@ from quadriga.faults.outcome import Moment, describe_outcome
 from quadriga.faults.teller import LEAD_MS, FaultTeller
 from quadriga.recordings.summary import RECORDING
 from quadriga.recordings.traces import read_traces
-from quadriga.shared.bus.liveness import missed_ns_of
 from quadriga.shared.bus.session import Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
@@ -154,14 +152,7 @@ def _describe(config: Config, moment: Moment, folder: Path) -> dict[str, Any]:
     try:
         recording = Recording(folder / RECORDING)
         told = list(parse_events(read_log(folder, SIM)))
-        missed = list(_read_missed(folder))
-        return describe_outcome(config, read_traces(recording), recording, moment, told, missed)
+        return describe_outcome(config, read_traces(recording), recording, moment, told)
     except RecordingError as error:
         # Rows are published, and where they were walked is nobody's business.
         return {"robot": moment.robot, "error": str(error).replace(f"{folder}/", "")}
-
-
-def _read_missed(folder: Path) -> Iterator[int]:
-    """When processes have missed who drives time, or their link, ns since 1970."""
-    for log in sorted((folder / "logs").glob("*.log")):
-        yield from filter(None, map(missed_ns_of, read_log(folder, log.stem)))

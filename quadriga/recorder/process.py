@@ -20,7 +20,7 @@ from quadriga.shared.config.timing import periods
 from quadriga.shared.errors import BusError, ProcessError, RecordingError, system_reason
 from quadriga.shared.members import RECORDER, has_lead
 from quadriga.shared.recording.metadata import END
-from quadriga.shared.recording.quota import LARGEST, Quota
+from quadriga.shared.recording.quota import Quota
 from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.runtime.scheduling import precede_ordinary, take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
@@ -128,10 +128,10 @@ def _schedule(config: Config) -> None:
 
 def _subscribe(bus: Bus, keys: KeyFilter) -> None:
     """Hear what is recorded, and the events, which announce the end of the walk."""
-    bus.subscribe(keys.expression, largest=LARGEST)
+    bus.subscribe(keys.expression)
     event = EVENT.key(bus.team)
     if not keys(event):
-        bus.subscribe(event, largest=LARGEST)
+        bus.subscribe(event)
 
 
 def _list_files(parts: Parts, ending: ProcessError | None) -> RecordedFiles:
@@ -146,7 +146,7 @@ def _note_end(parts: Parts, session: Session) -> ProcessError | None:
     if loss is None:
         return None
     tick = max(parts.last_tick(), 0)
-    error = loss_error(loss, tick, session.loss_ns, session.note)
+    error = loss_error(loss, tick)
     detail, missed = f"{error.name}: {error.got}", str(session.loss_ns)
     parts.note(END, {"code": loss.code, "detail": detail, "tick": str(tick), "missed_ns": missed})
     return error

@@ -9,18 +9,17 @@ from typing import Final
 from quadriga.recorder.parts import Parts
 from quadriga.recorder.selection import KeyFilter
 from quadriga.recorder.starvation import Starvation
-from quadriga.shared.bus.liveness import LAST_PACKETS, Loss, LossTimer, find_loss
+from quadriga.shared.bus.liveness import LAST_PACKETS, Loss, find_loss
 from quadriga.shared.bus.session import Bus
 from quadriga.shared.codec import decode
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
 from quadriga.shared.members import PLANNER, plant_name
 from quadriga.shared.messages import Event
-from quadriga.shared.recording.quota import OVERSIZED
 from quadriga.shared.recording.reader import name_of
 from quadriga.shared.recording.ticks import SkippedTicks
 from quadriga.shared.robots.conventions import robot_names
-from quadriga.shared.runtime.clock import log_ns, monotonic, sleep
+from quadriga.shared.runtime.clock import log_ns, monotonic, sleep, wall_ns
 from quadriga.shared.runtime.scheduling import take_priority
 from quadriga.shared.topics import EVENT, find_topic
 
@@ -61,7 +60,7 @@ class Session:
         self._ended = self._seen = self._announced = self._drops = False
         self._hurries = config.world.mode == "lockstep"  # then it does from the start
         self._passed_over = SkippedTicks(config)
-        self._losses = LossTimer(bus, config)
+        self._missed_ns = 0
 
     def record(self, *, late: bool, seen: bool) -> None:
         """Record until the end; a late recorder reports what it has once it knows.
@@ -73,13 +72,9 @@ class Session:
         self._seen = seen
         self._say(f"recording team {self._bus.team!r} to {self._parts.paths[0]}")
         self._flushed = self._begun = monotonic()
-        still = self._bus.standstill
-        still.begin()
-        starvation, stood = Starvation(self._begun), still.total
+        starvation = Starvation(self._begun)
         while not (self._stopped() or self._ended):
             self._take(max(0.0, self._flushed + FLUSH - monotonic()))
-            if still.total > stood:  # which no priority would have helped
-                starvation, stood = Starvation(monotonic()), still.total
             if starvation.look(monotonic()):
                 self._hurry()
             if late and monotonic() - self._begun > _LOOK and self._parts.messages:
@@ -123,7 +118,6 @@ class Session:
             some = self._take(QUIET)
             if not some and (self.find_unannounced() is None or monotonic() > begun + LAST_PACKETS):
                 break
-        self._parts.quota.refused[OVERSIZED] += self._bus.oversized
         if self._bus.dropped:
             self._say(f"{self._bus.dropped:,} messages were dropped before they were recorded")
 
@@ -132,14 +126,9 @@ class Session:
         return find_loss(self._bus, self._config) if self._seen and not self._announced else None
 
     @property
-    def note(self) -> str:
-        """What this process has to say of itself where others are missing."""
-        return self._bus.standstill.note
-
-    @property
     def loss_ns(self) -> int:
         """When what has vanished was missed first, ns since 1970; 0: all is there."""
-        return self._losses.missed_ns
+        return self._missed_ns
 
     def _take(self, timeout: float) -> bool:
         """Write all that has arrived; False if nothing came within `timeout` seconds."""
@@ -172,9 +161,10 @@ class Session:
         if self._bus.dropped and not self._drops:
             self._drops = True
             self._say("this computer is too busy to record all: messages are dropped from now on")
-        gone = self._losses.poll() is not None
+        gone = find_loss(self._bus, self._config) is not None
+        self._missed_ns = (self._missed_ns or wall_ns()) if gone else 0
         self._ended = self._seen and gone
-        self._seen = self._seen or self._losses.since is None
+        self._seen = self._seen or not gone
 
 
 def _format_missed(first_ticks: Mapping[str, int]) -> str:

@@ -19,7 +19,6 @@ from quadriga.shared.printable import printable_line
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.metadata import COUNTS
 from quadriga.shared.recording.reader import ChunkEntry, Recording
-from quadriga.shared.recording.recover import DamagedRecording
 from quadriga.shared.topics import Topic, find_topic
 from quadriga.tables import align_columns
 
@@ -101,16 +100,14 @@ def _decode_valid(
         schema.notes.append(f"{foreign} of keys outside the table, not looked at")
 
 
-def _check_whole(
-    source: Recording | DamagedRecording, error: RecordingError | None, messages: int
-) -> Finding:
+def _check_whole(source: Recording, error: RecordingError | None, messages: int) -> Finding:
     """Whether the file is as it was written."""
     whole = Finding("whole", "messages", messages)
     notes = source.notes
     missing = max(read_counts(notes).get("messages", messages) - messages, 0)
     whole.looked += missing
     for damage in source.damages:
-        whole.add_objection(-1, "", str(damage), "a readable file", 0)
+        whole.add_objection(-1, "", damage, "a readable file", 0)
     if error is not None:
         whole.add_objection(-1, "", error.got, error.expected, 0)
     if whole.first or missing:

@@ -37,7 +37,7 @@ def format_survey(survey: Survey) -> list[str]:
 def _about(s: Survey) -> Iterator[tuple[str, str]]:
     yield "file", f"{s.size / 1e6:.2f} MB, {'damaged' if s.error else 'whole'}"
     for damage in s.damages[:10]:
-        yield "damage", str(damage)
+        yield "damage", damage
     if s.log_times is not None:
         first, last = s.log_times
         start = format_local("%Y-%m-%d %H:%M:%S %Z", first)

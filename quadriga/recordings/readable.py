@@ -9,7 +9,6 @@ from quadriga.shared.errors import RecordingError
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.metadata import RECORDING
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.recording.recover import DamagedRecording
 
 
 def recording_of(path: Path) -> Path:
@@ -17,7 +16,7 @@ def recording_of(path: Path) -> Path:
     return path / RECORDING if path.is_dir() else path
 
 
-def open_readable(path: Path) -> tuple[Recording | DamagedRecording, RecordingError | None]:
+def open_readable(path: Path) -> tuple[Recording, RecordingError | None]:
     """A whole recording, or what is left of a damaged one and what is wrong with it.
 
     Raises:
@@ -27,14 +26,11 @@ def open_readable(path: Path) -> tuple[Recording | DamagedRecording, RecordingEr
         recording = Recording(path)
         recording.require_whole()
     except RecordingError as error:
-        salvage = DamagedRecording(path)
-        next(salvage.entries(), None)  # raises if a newer version wrote them
-        return salvage, error
-    next(recording.entries(), None)
+        return Recording(path, salvage=True), error
     return recording, None
 
 
-def config_or_default(source: Recording | DamagedRecording) -> Config:
+def config_or_default(source: Recording) -> Config:
     """The configuration of a recorded walk; the default if the file has lost it."""
     try:
         return recorded_config(source)

@@ -15,7 +15,6 @@ from quadriga.shared.errors import RecordingError, name_file_errors
 from quadriga.shared.recording.metadata import END, LOST, PROFILE
 from quadriga.shared.recording.quota import Quota
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.recording.recover import Damage, DamagedRecording
 from quadriga.shared.recording.ticks import TickTrack
 from quadriga.shared.recording.writer import RecordingWriter
 from quadriga.shared.runtime.clock import wall_ns
@@ -43,7 +42,7 @@ class Recovery:
     out: Path
     messages: int
     expected: int | None
-    damages: tuple[Damage, ...]
+    damages: tuple[str, ...]
     tracks: Mapping[str, TickTrack]
     never_came: Mapping[str, str]
     has_metadata: bool
@@ -61,7 +60,7 @@ def recover(path: Path, out: Path | None) -> Recovery | None:
         RecordingError: nothing can be read of it, or the new file cannot be written.
     """
     source, error = open_readable(path)
-    if isinstance(source, Recording) or error is None:
+    if error is None:
         return None
     if not source.metadata and next(source.entries(), None) is None:
         raise RecordingError(
@@ -134,7 +133,7 @@ def _format_gaps(track: TickTrack) -> tuple[str, str]:
     return f"{track.lost:,}", text
 
 
-def _describe_source(source: DamagedRecording, path: Path) -> dict[str, str]:
+def _describe_source(source: Recording, path: Path) -> dict[str, str]:
     return {
         "from": path.name,
         "at_ns": str(wall_ns()),

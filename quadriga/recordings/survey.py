@@ -15,7 +15,6 @@ from quadriga.shared.errors import MessageError, RecordingError
 from quadriga.shared.messages import Event, Message, Status
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import ChunkEntry, name_of
-from quadriga.shared.recording.recover import Damage
 from quadriga.shared.recording.ticks import SkippedTicks, TickTrack
 from quadriga.shared.topics import AGENT_EVENT, EVENT, INJECTED, STATUS, TABLE, topic_of
 
@@ -58,7 +57,7 @@ class Survey:
     events: tuple[Event, ...]
     statuses: Mapping[str, Status]
     error: RecordingError | None
-    damages: tuple[Damage, ...]
+    damages: tuple[str, ...]
 
     @property
     def world_ms(self) -> int:

@@ -10,6 +10,7 @@ from quadriga.shared.bus.diagnostics import lead
 from quadriga.shared.bus.session import POLL, READY, Bus
 from quadriga.shared.config.endpoints import is_tls
 from quadriga.shared.config.sections import Config
+from quadriga.shared.errors import BusError
 from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.runtime.scheduling import take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
@@ -42,6 +43,8 @@ def run(
         print(f"routing at {listen}", file=sys.stderr, flush=True)
         if once:
             timeout = _STAGES * config.bus.barrier_timeout
-            bus.wait_for(READY, [lead(config)], timeout, stopped)
+            if not bus.wait_for(READY, [lead(config)], timeout, stopped) and not stopped():
+                name, cause = (f"team {bus.team!r} at {listen}", "not started, or elsewhere")
+                raise BusError(name, f"no {lead(config)} after {timeout:g} s", "a walk", cause)
         while not stopped() and (bus.linked or not once):
             sleep(POLL)

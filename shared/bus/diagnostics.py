@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Final, NamedTuple
+from math import inf
+from typing import Final
 
 from quadriga.shared.about import HERE, READY, STAGES, STARTED, WARMING_UP, About
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError
-from quadriga.shared.members import LEADS, PLANNER, SIM, Member, team_members
+from quadriga.shared.members import LEADS, SIM, Member, team_members
 from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.robots.conventions import robot_names
 
@@ -64,31 +65,17 @@ def lead(config: Config) -> str:
     return next(member.name for member in processes(config) if member.name in LEADS)
 
 
-def first_predicting(config: Config) -> str:
-    """Name of the first process that plans with a predictor; "" if none does."""
-    kind = find_kind(config.planner.kind)
-    if not kind.needs_predictor:
+def clock_difference(ahead: float, error: float, limit: float) -> str:
+    """How far a clock differs from another, in words; "" if by no more than `limit`, or not surely.
+
+    Args:
+        ahead: of the other, s.
+        error: by which that may be off, s.
+        limit: s.
+    """
+    if abs(ahead) - error <= limit:
         return ""
-    return PLANNER if kind.central else robot_names(config.team.robots)[0]
-
-
-class ClockOffset(NamedTuple):
-    """How far one system clock is ahead of another, and how far that may be off, s."""
-
-    ahead: float
-    error: float
-
-    def __sub__(self, other: ClockOffset) -> ClockOffset:
-        """The offset between two clocks that were both compared with a third."""
-        return ClockOffset(self.ahead - other.ahead, self.error + other.error)
-
-    def exceeds(self, limit: float) -> bool:
-        """Whether the clocks differ by more than `limit` for sure."""
-        return abs(self.ahead) - self.error > limit
-
-    def __str__(self) -> str:
-        size, direction = abs(self.ahead), "ahead of" if self.ahead > 0.0 else "behind"
-        return f"{size:.3g} s {direction}" if size >= 1.0 else f"{1e3 * size:.3g} ms {direction}"
+    return f"{1e3 * abs(ahead):,.1f} ms {'ahead of' if ahead > 0.0 else 'behind'}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,12 +103,12 @@ class MemberAnswer:
     arrived_ns: int
 
     @property
-    def clock_offset(self) -> ClockOffset:
-        """How far its system clock is ahead of the asker's; zeros if it cannot be read."""
+    def clock_offset(self) -> tuple[float, float]:
+        """How far its system clock is ahead of the asker's, and how far that may be off, s."""
         if self.about is None:
-            return ClockOffset(0.0, 0.0)
+            return 0.0, inf
         middle, round_trip = (self.asked_ns + self.arrived_ns) // 2, self.arrived_ns - self.asked_ns
-        return ClockOffset(1e-9 * (self.about.wall_ns - middle), 5e-10 * round_trip)
+        return 1e-9 * (self.about.wall_ns - middle), 5e-10 * round_trip
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +122,6 @@ class TeamView:
         names: all that the team should have.
         answers: what was said, by name; processes of one name answer each.
         lead: who drives the team's time, with which all must agree; None: it has said nothing.
-        planner: the first process that plans with a predictor, likewise.
     """
 
     linked: bool
@@ -144,7 +130,12 @@ class TeamView:
     names: frozenset[str]
     answers: Mapping[str, Sequence[MemberAnswer]] = field(default_factory=dict)
     lead: About | None = None
-    planner: About | None = None
+
+    @property
+    def planner(self) -> About | None:
+        """The first process by name that has told of a predictor; None: there is none."""
+        told = (about for name in sorted(self.answers) for about in self.abouts(name))
+        return next((about for about in told if about.predictor), None)
 
     def abouts(self, name: str) -> list[About]:
         """What the processes of a name have said of themselves, as far as it can be read."""
@@ -178,7 +169,7 @@ def describe_absent(absent: Collection[Member], view: TeamView) -> str:
 def disagreements(process: About, view: TeamView) -> Iterator[Diagnosis]:
     """In what a process differs from who drives time; of another version nothing else is compared.
 
-    Predictors are compared with the first process that plans, where both have one.
+    Predictors are compared with that of the first process that has one.
     """
     lead, planner = view.lead, view.planner
     if lead is None:
@@ -187,13 +178,13 @@ def disagreements(process: About, view: TeamView) -> Iterator[Diagnosis]:
         yield _differs("version", process.version, lead, lead.version)
         return
     for of, mine, theirs in (
-        ("messages", _by_name(process.messages, " "), _by_name(lead.messages, " ")),
-        ("configuration", _by_name(process.config, "="), _by_name(lead.config, "=")),
+        ("messages", process.messages, lead.messages),
+        ("configuration", process.config, lead.config),
     ):
-        names = [name for name in sorted({*mine, *theirs}) if mine.get(name) != theirs.get(name)]
-        if names:
-            yield _differs(of, _name_values(names, mine), lead, _name_values(names, theirs))
-    if planner and process.predictor and planner.predictor not in ("", process.predictor):
+        if {*mine} != {*theirs}:
+            got, wanted = _first_few({*mine} - {*theirs}), _first_few({*theirs} - {*mine})
+            yield _differs(of, got, lead, wanted)
+    if planner and process.predictor and process.predictor != planner.predictor:
         got, wanted = process.predictor[:_DIGITS], planner.predictor[:_DIGITS]
         yield _differs("predictor", got, planner, wanted)
     if process.code != lead.code:
@@ -217,16 +208,10 @@ def refuse(name: str, team: str, found: Iterable[Diagnosis]) -> None:
             raise BusError(f"{name} of team {team!r}", item.text, expected, item.remedy)
 
 
-def _by_name(lines: Iterable[str], separator: str) -> dict[str, str]:
-    split = (line.partition(separator) for line in lines)
-    return {name: value for name, _, value in split}
-
-
-def _name_values(names: list[str], values: Mapping[str, str]) -> str:
-    """Some of the values, with their names, and how many more there are."""
-    named = [f"{name} {values.get(name, 'unknown')}" for name in names[:_SHOWN]]
-    more = len(names) - len(named)
-    return ", ".join(named) + (f" and {more} more" if more else "")
+def _first_few(lines: Collection[str]) -> str:
+    """Some of the lines, and how many more there are."""
+    more = len(lines) - _SHOWN
+    return ", ".join(sorted(lines)[:_SHOWN]) + (f" and {more} more" if more > 0 else "")
 
 
 def _explain_silence(member: Member, view: TeamView) -> Diagnosis:
@@ -241,11 +226,9 @@ def _explain_silence(member: Member, view: TeamView) -> Diagnosis:
             return Diagnosis("foreign", NOTE, text)
         cause = "frozen or overloaded, or an earlier version of quadriga: see its log, restart it"
         return Diagnosis("not-answering", BAD, "here, but does not answer", cause)
-    witnesses = sorted(
-        other for other in view.answers if (said := view.about(other)) and name in said.sees
-    )
-    if witnesses:
-        text = f"seen by {', '.join(witnesses)}, but not from here"
+    seen_by = [n for n in sorted(view.answers) for said in view.abouts(n) if name in said.sees]
+    if seen_by:
+        text = f"seen by {', '.join(seen_by)}, but not from here"
         cause = "frozen, or in peer mode its bus.listen cannot be reached from here"
         return Diagnosis("not-reachable", BAD, text, cause)
     if not view.linked:
@@ -279,14 +262,15 @@ def _explain_stage(about: About, view: TeamView) -> Iterator[Diagnosis]:
 
 
 def _compare_clocks(member: Member, view: TeamView) -> Iterator[Diagnosis]:
-    """That its system clock is off: against this computer's, or by which plants pace robots."""
+    """That its system clock is off: against that of who drives time, or else this computer's."""
     lead = view.lead
-    paces = member.role.name == SIM and lead is not None and _PACED.issubset(lead.config)
-    led = [said.clock_offset for said in view.answers.get(lead.name, ())] if lead else []
+    (behind, doubt), whose, limit = (0.0, 0.0), "this computer's", CLOCK_LIMIT
+    if lead is not None and (led := view.answers.get(lead.name)):
+        (behind, doubt), whose = led[0].clock_offset, f"that of {lead.name}"
+        if member.role.name == SIM and _PACED.issubset(lead.config):
+            limit = PACE_LIMIT
     for answer in view.answers[member.name]:
-        if answer.clock_offset.exceeds(CLOCK_LIMIT):
-            text = f"its system clock is {answer.clock_offset} this computer's"
-            yield Diagnosis(CLOCK_OFF, BAD, text, CLOCK_REMEDY)
-        elif paces and led and (offset := answer.clock_offset - led[0]).exceeds(PACE_LIMIT):
-            text = f"its system clock is {offset} that of the plant which drives time"
+        ahead, error = answer.clock_offset
+        if difference := clock_difference(ahead - behind, error + doubt, limit):
+            text = f"its system clock is {difference} {whose}"
             yield Diagnosis(CLOCK_OFF, BAD, text, CLOCK_REMEDY)

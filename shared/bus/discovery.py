@@ -20,13 +20,12 @@ from quadriga.shared.bus.diagnostics import (
     TeamView,
     describe_absent,
     disagreements,
-    first_predicting,
     lead,
     members,
     processes,
     refuse,
 )
-from quadriga.shared.bus.session import HERE, READY, Bus, absence_error, pause
+from quadriga.shared.bus.session import HERE, READY, Bus, pause
 from quadriga.shared.bus.settings import describe_way
 from quadriga.shared.codec import decode, encode
 from quadriga.shared.config.sections import Config
@@ -43,7 +42,6 @@ Answered = dict[str, list[MemberAnswer]]
 _TIMEOUT: Final = 1.0  # s, for an answer: whoever is not frozen gives it within milliseconds
 _GRACE: Final = 0.5  # s more, after which nothing is awaited whatever the bus says
 _PATIENCE: Final = 3.0  # s, in which those that do not answer are asked again
-_BETWEEN: Final = 0.1  # s, between two questions to one that does not answer
 _CLOCK_ASKS: Final = 8  # of which that with the shortest round trip tells a clock best
 _QUIET: Final = 2.0  # s of waiting that are not logged
 _EVERY: Final = 5.0  # s, between two looks at those that are awaited
@@ -135,7 +133,7 @@ def ask_clock(bus: Bus, name: str) -> MemberAnswer | None:
         if not new:  # to ask one that is frozen takes a second
             break
         received += new
-    return min(received, key=lambda item: item.clock_offset.error, default=None)
+    return min(received, key=lambda item: item.clock_offset[1], default=None)
 
 
 def read_about(name: str, payload: bytes) -> About | None:
@@ -144,8 +142,8 @@ def read_about(name: str, payload: bytes) -> About | None:
         about = decode(payload, About)
     except MessageError:
         return None
-    texts = (about.host, about.version, about.code, about.predictor, *about.config, *about.sees)
-    plain = all(text.isprintable() for text in texts)
+    texts = (about.host, about.version, about.code, about.predictor)
+    plain = all(map(str.isprintable, (*texts, *about.config, *about.messages, *about.sees)))
     return about if plain and about.name == name and about.stage in STAGES else None
 
 
@@ -158,8 +156,7 @@ def view_of(
     """
     linked = bus.linked or bus.name in LEADS  # to whom all others link
     view = TeamView(linked, bus.members_at(HERE), bus.duplicates(HERE), members(config), answered)
-    planner = view.about(first_predicting(config))
-    return replace(view, lead=view.about(lead(config)) or fallback, planner=planner)
+    return replace(view, lead=view.about(lead(config)) or fallback)
 
 
 def join(
@@ -196,8 +193,7 @@ def join(
     _check_single(bus, config)
     # Whoever differs leaves by itself, so that the others can go on waiting for the right one.
     # The process that drives time refuses later who does not answer.
-    others = {lead(config), first_predicting(config)} - {bus.name, ""}
-    found = [*disagreements(info.about, view_of(bus, config, ask(bus, sorted(others))))]
+    found = [*disagreements(info.about, view_of(bus, config, ask(bus)))]
     refuse(bus.name, bus.team, found)
     for item in found:
         log(f"{bus.name} has {item.text}: {item.remedy}")
@@ -233,7 +229,12 @@ def await_members(
             if late:
                 # Only now: to try the way may take a second in which a robot is not attended.
                 way = "" if view.linked else f"; {describe_way(config.bus, bus.name)}"
-                raise absence_error(bus, stage, absent, wanted, timeout, reasons + way)
+                raise BusError(
+                    f"barrier of team {bus.team!r}, seen by {bus.name}",
+                    f"no {', '.join(sorted(absent))} at stage {stage!r} after {timeout:g} s",
+                    ", ".join(sorted(wanted)),
+                    reasons + way,
+                )
             if reasons != logged:
                 log(f"{bus.name} waits; {reasons}")
             due, logged = monotonic() + _EVERY, reasons
@@ -284,16 +285,14 @@ def check_others(bus: Bus, config: Config, names: Collection[str], wait: Pause =
     Raises:
         BusError: one differs, or gives no answer; the message names it and in what it differs.
     """
-    others, answered = sorted({*names} - {bus.name}), ask(bus, wait=wait)
+    others, answered = {*names} - {bus.name}, ask(bus, wait=wait)
     foreign = {member.name for member in processes(config) if member.foreign}
     deadline = monotonic() + _PATIENCE
-    while (silent := {*others} - {*answered} - foreign) and monotonic() < deadline:
-        again = monotonic() + _BETWEEN
-        while monotonic() < again:
-            wait()
+    while (silent := others - {*answered} - foreign) and monotonic() < deadline:
+        wait()
         answered |= ask(bus, sorted(silent), wait)
     view = view_of(bus, config, answered, describe_process(config, bus.name))
-    for name in others:
+    for name in sorted(others):
         about = view.about(name)
         if about is not None:
             refuse(name, bus.team, disagreements(about, view))

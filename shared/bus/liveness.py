@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-from datetime import UTC, datetime
 from typing import Final, NamedTuple
 
 from quadriga.shared.bus.diagnostics import lead
@@ -13,9 +11,8 @@ from quadriga.shared.codes import LEAD_GONE, LINK_LOST
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.members import has_lead
-from quadriga.shared.runtime.clock import monotonic, wall_ns
+from quadriga.shared.runtime.clock import monotonic
 
-_MISSED: Final = re.compile(r", missed since (\S+Z),")
 LAST_PACKETS: Final = 1.0  # s wall, in which what was sent before may still arrive
 
 
@@ -43,56 +40,13 @@ def find_loss(bus: Bus, config: Config) -> Loss | None:
     return None
 
 
-def loss_error(loss: Loss, tick: int, missed_ns: int = 0, note: str = "") -> ProcessError:
-    """The error of a process that ends because of a loss at a tick, ms.
-
-    `missed_ns` is when it was missed first, ns since 1970; 0: unknown. `note`: see `Standstill`.
-    """
+def loss_error(loss: Loss, tick: int) -> ProcessError:
+    """The error of a process that ends because of a loss at a tick, ms."""
     cause = "killed, failed, or cut off: see what it says itself"
     if loss.code == LINK_LOST:
         cause = "the router was killed, the network is gone, or a certificate has expired"
     got = f"none any more after {tick / 1000:.3f} s of the walk"
-    if missed_ns:
-        moment = datetime.fromtimestamp(1e-9 * missed_ns, UTC)
-        got += f", missed since {moment.isoformat(timespec='milliseconds')[:-6]}Z"
-    return ProcessError(
-        loss.what, got, "it to be there until the walk's announced end", cause + note
-    )
-
-
-def missed_ns_of(line: str) -> int:
-    """When something was missed, ns since 1970, of a line with a `loss_error`; 0 of any other."""
-    found = _MISSED.search(line)
-    if found is None:
-        return 0
-    return 1_000_000 * round(1e3 * datetime.fromisoformat(found[1]).timestamp())
-
-
-class LossTimer:
-    """Since when something is gone, and whether that is longer than `grace` seconds.
-
-    Attributes:
-        since: when the loss was seen first, s of the clock; None: there is none.
-    """
-
-    def __init__(self, bus: Bus, config: Config, grace: float = 0.0) -> None:
-        self._bus, self._config, self._grace = bus, config, grace
-        self.since: float | None = None
-
-    def poll(self) -> Loss | None:
-        """What is gone for good; None if all is there, or may be back."""
-        loss, now = find_loss(self._bus, self._config), monotonic()
-        if loss is None:
-            self.since = None
-            return None
-        if self.since is None:
-            self.since = now
-        return loss if now - self.since >= self._grace else None
-
-    @property
-    def missed_ns(self) -> int:
-        """When the loss was seen first, ns since 1970; 0: there is none."""
-        return 0 if self.since is None else wall_ns() - round(1e9 * (monotonic() - self.since))
+    return ProcessError(loss.what, got, "it to be there until the walk's announced end", cause)
 
 
 class Liveness:
@@ -107,9 +61,9 @@ class Liveness:
     """
 
     def __init__(self, bus: Bus, config: Config) -> None:
-        self._timer = LossTimer(bus, config, LAST_PACKETS)
         self._bus, self._config = bus, config
         self._walks = False
+        self._missed_since: float | None = None
         self._silent_since: float | None = None  # since the end was announced
 
     def is_over(self, *, announced: bool) -> bool:
@@ -130,14 +84,15 @@ class Liveness:
         Raises:
             ProcessError: who drives time, or the link to the router, is gone.
         """
-        loss = self._timer.poll()
-        if loss is not None:
-            note = self._bus.standstill.note
-            raise loss_error(loss, max(tick, 0), self._timer.missed_ns, note)
+        loss, now = find_loss(self._bus, self._config), monotonic()
+        if loss is None or self._missed_since is None:
+            self._missed_since = None if loss is None else now
+        elif now - self._missed_since >= LAST_PACKETS:
+            raise loss_error(loss, max(tick, 0))
 
     def receive(self) -> None:
         """Something has arrived: the team walks."""
-        self._silent_since = self._timer.since = None
+        self._silent_since = self._missed_since = None
         if not self._walks:
             self._walks = True
             log(f"{self._bus.name}: the team walks")

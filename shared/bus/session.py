@@ -7,7 +7,7 @@ import json
 import os
 import sys
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from queue import SimpleQueue
 from threading import get_ident
@@ -26,7 +26,6 @@ from quadriga.shared.bus.settings import (
     opening_error,
     router_settings,
 )
-from quadriga.shared.bus.standstill import Standstill
 from quadriga.shared.config.sections import BusConfig
 from quadriga.shared.errors import BusError
 from quadriga.shared.members import ROUTER
@@ -82,10 +81,6 @@ class Bus:
     token `<team>/<name>/<stage>/<session>`: it vanishes within milliseconds when its process dies,
     and the session in it tells two processes of the same name apart. A process's last packets may
     arrive after its token has vanished.
-
-    Attributes:
-        oversized: payloads that were dropped because of their size so far.
-        standstill: how long this process has not run.
     """
 
     def __init__(self, session: zenoh.Session, team: str, name: str) -> None:
@@ -96,7 +91,7 @@ class Bus:
         self._inbox: Mailbox[zenoh.Sample] = Mailbox(_INBOX)
         self._tokens: set[tuple[str, str, str]] = set()  # of others: name, stage, session
         self._declared: dict[str, zenoh.LivelinessToken] = {}
-        self._closed, self.oversized, self.standstill = False, 0, Standstill()
+        self._closed = False
         tokens, ack = f"{team}/*/*/*", f"{team}/{name}/{RECEIVED}"
         # Zenoh drops publishers and subscribers nobody refers to.
         self._declarations: list[Any] = [
@@ -204,20 +199,9 @@ class Bus:
         put: Callable[[bytes], None] = publisher.put
         return put
 
-    def subscribe(self, key: str, *, largest: int = 0) -> None:
-        """Feed what others publish on `key` (may hold `*` and `**`) into the inbox.
-
-        Payloads of more than `largest` bytes (0: any) are dropped as they arrive and counted in
-        `oversized`.
-        """
-
-        def put(sample: zenoh.Sample) -> None:
-            if len(sample.payload) > largest:
-                self.oversized += 1  # by one thread, see `_ONE_RECEIVES`
-            else:
-                self._inbox.put(sample)
-
-        self._hear(key, _direct(put if largest else self._inbox.put))
+    def subscribe(self, key: str) -> None:
+        """Feed what others publish on `key` (may hold `*` and `**`) into the inbox."""
+        self._hear(key, _direct(self._inbox.put))
 
     @property
     def dropped(self) -> int:
@@ -267,21 +251,16 @@ class Bus:
 
     def get(self, timeout: float) -> Packet | None:
         """The oldest packet of the inbox, waiting at most `timeout` seconds for one."""
-        self.standstill.look()
         sample = self._inbox.take(timeout)
-        self.standstill.look()
         return None if sample is None else _packet(sample)
 
     def drain(self) -> list[Packet]:
         """Everything in the inbox, oldest first, without waiting."""
-        self.standstill.look()
         return [_packet(sample) for sample in self._inbox.drain()]
 
     def declare(self, stage: str) -> None:
         """Tell everyone that this process has reached `stage`; again has no effect."""
         if stage not in self._declared:
-            if stage == READY:
-                self.standstill.begin()
             key = f"{self.team}/{self.name}/{stage}/{self._me}"
             self._declared[stage] = self._session.liveliness().declare_token(key)
 
@@ -301,21 +280,13 @@ class Bus:
         return frozenset(name for name, count in counts.items() if count > 1)
 
     def wait_for(
-        self, stage: str, names: Iterable[str], timeout: float, stopped: Callable[[], bool]
+        self, stage: str, names: Collection[str], timeout: float, stopped: Callable[[], bool]
     ) -> bool:
-        """Wait until all `names` are at `stage`; False if `stopped()` came first.
-
-        Raises:
-            BusError: some were still absent after `timeout` seconds; the message names them.
-        """
-        wanted = frozenset(names) - {self.name}
+        """Wait until all `names` are at `stage`; False if the time is over, or `stopped()`."""
         deadline = monotonic() + timeout
-        while absent := wanted - self.members_at(stage):
-            if stopped():
+        while frozenset(names) - {self.name} - self.members_at(stage):
+            if stopped() or monotonic() > deadline:
                 return False
-            if monotonic() > deadline:
-                cause = "not started, or at another endpoint or team"
-                raise absence_error(self, stage, absent, wanted, timeout, cause)
             pause()
         return True
 
@@ -371,18 +342,6 @@ class Bus:
             return
         there = sample.kind == zenoh.SampleKind.PUT
         (self._tokens.add if there else self._tokens.discard)((name, stage, session))
-
-
-def absence_error(
-    bus: Bus, stage: str, absent: Iterable[str], wanted: Iterable[str], after: float, cause: str
-) -> BusError:
-    """The error of who has waited for others for so many seconds."""
-    return BusError(
-        f"barrier of team {bus.team!r}, seen by {bus.name}",
-        f"no {', '.join(sorted(absent))} at stage {stage!r} after {after:g} s",
-        f"{', '.join(sorted(wanted))}",
-        cause,
-    )
 
 
 def _packet(sample: zenoh.Sample) -> Packet:

@@ -50,8 +50,6 @@ _COMMON: Final = {
 
 OPEN: Final = "open"  # something listens there
 REFUSED: Final = "refused"  # the connection, or our certificate
-SILENT: Final = "silent"
-UNRESOLVED: Final = "unresolved"
 UNREACHABLE: Final = "unreachable"
 UNTRIED: Final = "untried"
 _TIMEOUT: Final = 1.0  # s
@@ -168,13 +166,11 @@ def try_endpoint(endpoint: str, timeout: float = _TIMEOUT) -> Reach:
         return Reach(UNTRIED, f"{endpoint} was not tried: only tcp and tls can be")
     try:
         socket.create_connection((host, port), timeout).close()
-    except socket.gaierror:
-        return Reach(UNRESOLVED, f"the name {host} does not resolve here")
     except (ConnectionRefusedError, ConnectionResetError):
         return Reach(REFUSED, f"nobody listens at {endpoint}")
     except TimeoutError:
         why = "it is off, in another network, or behind a firewall"
-        return Reach(SILENT, f"{host} does not answer within {timeout:g} s: {why}")
+        return Reach(UNREACHABLE, f"{host} does not answer within {timeout:g} s: {why}")
     except OSError as error:
         return Reach(UNREACHABLE, f"{endpoint} cannot be reached: {error}")
     return Reach(OPEN, f"something listens at {endpoint}")

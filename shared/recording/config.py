@@ -13,14 +13,13 @@ from quadriga.shared.errors import ConfigError, RecordingError
 from quadriga.shared.planner_kinds import stand_in
 from quadriga.shared.printable import printable_line
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.recording.recover import DamagedRecording
 from quadriga.shared.robots.registry import ROBOTS
 
 PLUGIN: Final = "planner"  # in the metadata: what is to be known of a plug-in's kind of planner
 _OTHER_VERSION: Final = "recorded by another version of quadriga: use that one"
 
 
-def recorded_config(recording: Recording | DamagedRecording) -> Config:
+def recorded_config(recording: Recording) -> Config:
     """The configuration of a recorded run.
 
     A recording holds every key, so that no default of today stands for one of then. A planner, or a

@@ -13,7 +13,6 @@ RECORDING: Final = "run.mcap"  # in a run folder
 PROFILE: Final = "quadriga"  # of the file, and the name of what its writer was given
 COUNTS: Final = f"{PROFILE}.counts"  # written at the end: what the writer counted
 LOST: Final = f"{PROFILE}.lost"  # by key, messages that did not come
-SINCE: Final = f"{PROFILE}.since"  # by key, tick of its first message
 CHANNELS: Final = f"{PROFILE}.channels"  # sealed: keys by channel, of those that are new here
 END: Final = f"{PROFILE}.end"  # code, detail and tick of an end that nobody announced
 _FORMAT: Final = "format"

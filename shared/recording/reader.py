@@ -1,14 +1,13 @@
-"""Reading MCAP recordings of all traffic, whole ones and such that are cut.
+"""Reading MCAP recordings of all traffic: whole ones, such that are cut, and damaged ones.
 
-`quadriga.shared.recording.recover` reads what is left of a damaged one. Whatever MCAP allows is
-read: chunks that are packed or not, records outside of any, checksums and index that are left out.
+Files are read as the recorder writes them: messages in packed chunks, with checksums and an index.
 """
 
 from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Container, Iterator
+from collections.abc import Callable, Container, Iterator
 from contextlib import suppress
 from io import SEEK_CUR, SEEK_END, BytesIO
 from pathlib import Path
@@ -26,7 +25,7 @@ from mcap.writer import MCAP0_MAGIC
 from quadriga.shared.codec import decode, envelope
 from quadriga.shared.errors import RecordingError, name_file_errors
 from quadriga.shared.messages import Message
-from quadriga.shared.recording.metadata import PROFILE, unseal
+from quadriga.shared.recording.metadata import CHANNELS, PROFILE, unseal
 from quadriga.shared.topics import TABLE, find_topic, topic_of
 
 M = TypeVar("M", bound=Message)
@@ -41,11 +40,11 @@ CORRUPT: Final = (
 
 _MESSAGE: Final = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log, publish
 _LATEST: Final = (1 << 63) - 1  # ns: what MCAP has 64 bits for, tables have 63 and a sign
-BARE: Final = (Opcode.CHANNEL, Opcode.MESSAGE)  # in chunks, and outside of any
 _RECOVER: Final = "`quadriga recover` writes what is readable"
 _MEND: Final = f"one cut or damaged in its first bytes: {_RECOVER}"
-_DATA_END: Final = RECORD.size + 4  # bytes
-_FOOTER: Final = RECORD.size + 20  # bytes
+_DATA_END: Final = struct.Struct("<BQI")  # the record before the index: opcode, length, checksum
+_HEADER: Final = 64  # bytes within which a file's header names the program that wrote it
+_FOOTER: Final = 20  # bytes of its content
 
 
 class ChunkEntry(NamedTuple):
@@ -61,38 +60,60 @@ class Recording:
     """A recorded run, read front to back; a cut file is read up to the cut.
 
     Attributes:
-        metadata: what the writer was given.
+        metadata: what the writer was given; {} if no copy of it is intact.
         complete: whether the file was finished; False after a kill of the recorder.
-        cut: where and why reading stopped early, or empty; known once the entries are read.
+        damages: what could not be read, in the order of the file; known once the entries are read.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, salvage: bool = False) -> None:
         """Open a recording and read its metadata.
+
+        Args:
+            path: of the file.
+            salvage: go on behind chunks that are damaged, also if no metadata are intact.
 
         Raises:
             RecordingError: no such file, an empty one, or not a recording of this project.
         """
-        self.path, self.cut = path, ""
-        self.damages: tuple[()] = ()  # none can be told apart: `DamagedRecording` does
+        self.path, self._salvages = path, salvage
+        self.damages: list[str] = []
         with (
             name_file_errors(RecordingError, path, "a recording", "did the walk start?"),
             path.open("rb") as file,
         ):
-            head = file.read(len(MCAP0_MAGIC))
+            head = file.read(_HEADER)
             self._size = file.seek(0, SEEK_END)
             file.seek(max(self._size - len(MCAP0_MAGIC), 0))
             self.complete = file.tell() > 0 and file.read() == MCAP0_MAGIC
-        if head != MCAP0_MAGIC:
+        if not head.startswith(MCAP0_MAGIC):
             if not self._size:
                 raise RecordingError(str(path), "an empty file", "a recording")
             got = f"{self._size:,} bytes that do not start as MCAP"
             raise RecordingError(str(path), got, "an MCAP file", f"a foreign file, or {_MEND}")
-        for record in self._metadata():
-            if record.name == PROFILE:
-                self.metadata = unseal(record.metadata, str(path))
-                return
         got, expected = "no metadata of this project", "a recording made by `quadriga`"
-        raise RecordingError(str(path), got, expected, f"a foreign MCAP file, or {_MEND}")
+        wrong = RecordingError(str(path), got, expected, f"a foreign MCAP file, or {_MEND}")
+        self.metadata: dict[str, str] = {}
+        self._channels: dict[int, str] = {}  # keys, as they are noted beside the chunks
+        for record in self._metadata():
+            try:
+                if record.name == PROFILE and not self.metadata:
+                    self.metadata = unseal(record.metadata, str(path))
+                elif record.name == CHANNELS and salvage:
+                    noted = unseal(record.metadata, str(path))
+                    self._channels |= {int(channel): key for channel, key in noted.items()}
+            except RecordingError as error:
+                wrong = error
+            except ValueError:  # of a channel that somebody has forged
+                continue
+            if self.metadata and not salvage:
+                break
+        if not self.metadata and not (salvage and PROFILE.encode() in head):
+            raise wrong
+
+    @property
+    def cut(self) -> str:
+        """Where and why reading stopped early, or empty; known once the entries are read."""
+        return self.damages[0] if self.damages else ""
 
     def entries(
         self, names: Container[str] | None = None, keys: Container[str] | None = None
@@ -104,17 +125,23 @@ class Recording:
                 keys outside the table.
             keys: only these keys; None gives all.
         """
-        wanted: dict[int, str | None] = {}
-        for opcode, content in self._records(skip=Opcode.METADATA):
+
+        def key_if_wanted(key: str) -> str | None:
+            named = names is None or name_of(key) in names
+            return key if named and (keys is None or key in keys) else None
+
+        self.damages = []
+        wanted = {channel: key_if_wanted(key) for channel, key in self._channels.items()}
+        for opcode, content in self._records(self.damages, skip=Opcode.METADATA):
             try:
                 if opcode == Opcode.CHUNK:
-                    yield from messages_of(content_of(content), wanted, names, keys)
-                elif opcode in BARE:
-                    record = RECORD.pack(opcode, len(content)) + content
-                    yield from messages_of(record, wanted, names, keys)
+                    yield from _messages_of(content_of(content), wanted, key_if_wanted)
+                elif opcode == Opcode.MESSAGE:
+                    raise ValueError("messages outside of chunks")
             except CORRUPT as error:
-                self.cut = f"a chunk of {len(content)} bytes is corrupt ({error})"
-                return
+                self.damages.append(f"a record of {len(content):,} bytes is corrupt ({error})")
+                if not self._salvages:
+                    return
 
     def messages(self, kind: type[M], robot: str = "") -> Iterator[M]:
         """Decoded messages of a type (of one robot, or of all).
@@ -135,34 +162,22 @@ class Recording:
         """
         if not self.complete:
             raise self._damage_error(f"a file that is cut after {self._size:,} bytes")
-        content = np.memmap(self.path, np.uint8, "r").data
-        footer_at = max(self._size - len(MCAP0_MAGIC) - _FOOTER, 0)
-        footer = Footer.read(stream(content[footer_at + RECORD.size :].tobytes()))
-        start = footer.summary_start or footer_at  # 0: no summary
-        data_at = max(start - _DATA_END, 0)
-        data_end = content[data_at:start].tobytes()
-        there = data_end.startswith(RECORD.pack(Opcode.DATA_END, 4))
-        summary_crc = zlib.crc32(content[start : self._size - len(MCAP0_MAGIC) - 4])
-        if not (there and content[footer_at] == Opcode.FOOTER) or footer.summary_crc not in (
-            0,
-            summary_crc,
-        ):
-            raise self._damage_error("an index that fails its checksum")
-        crc = int.from_bytes(data_end[RECORD.size :], "little")
-        if crc and zlib.crc32(content[:data_at]) != crc:
-            raise self._damage_error("content that fails its checksum")
-        if not crc:  # then those of the chunks must do
-            for _ in self.entries():
-                pass
-            if self.cut:
-                raise self._damage_error(self.cut)
+        content, end = np.memmap(self.path, np.uint8, "r").data, self._size - len(MCAP0_MAGIC)
+        with suppress(*CORRUPT):
+            start = Footer.read(stream(content[end - _FOOTER : end].tobytes())).summary_start
+            data = start - _DATA_END.size
+            data_end = _DATA_END.pack(Opcode.DATA_END, 4, zlib.crc32(content[:data]))
+            summary_end = zlib.crc32(content[start : end - 4]).to_bytes(4, "little")
+            if content[data:start].tobytes() + content[end - 4 : end].tobytes() == (
+                data_end + summary_end
+            ):
+                return
+        raise self._damage_error("content that fails its checksum")
 
     @property
     def notes(self) -> dict[str, dict[str, str]]:
         """What the writer noted at the end, by name: `COUNTS`, `LOST` …; {} after a kill."""
-        cut = self.cut  # of the chunks, which are not read here
         notes = {record.name: dict(record.metadata) for record in self._metadata()}
-        self.cut = cut
         notes.pop(PROFILE, None)
         return notes
 
@@ -170,9 +185,8 @@ class Recording:
         cause = f"was the recorder killed, or the disk full? {_RECOVER}"
         return RecordingError(str(self.path), got, "a whole recording", cause)
 
-    def _records(self, skip: Opcode) -> Iterator[tuple[int, bytes]]:
+    def _records(self, damages: list[str], skip: Opcode) -> Iterator[tuple[int, bytes]]:
         """Opcode and content of the records, up to the cut if there is one; one kind is skipped."""
-        self.cut = ""
         with self.path.open("rb") as file:
             file.seek(len(MCAP0_MAGIC))
             while len(head := file.read(RECORD.size)) == RECORD.size:
@@ -185,31 +199,22 @@ class Recording:
                     file.seek(length, SEEK_CUR)
                 else:
                     yield opcode, file.read(length)
-        self.cut = f"the file ends at byte {self._size} in the middle of a record"
+        damages.append(f"the file ends at byte {self._size} in the middle of a record")
 
     def _metadata(self) -> Iterator[Metadata]:
-        for opcode, content in self._records(skip=Opcode.CHUNK):
+        for opcode, content in self._records([], skip=Opcode.CHUNK):
             if opcode == Opcode.METADATA:
                 with suppress(*CORRUPT):
                     yield Metadata.read(stream(content))
 
 
-def messages_of(
-    chunk: bytes,
-    wanted: dict[int, str | None],
-    names: Container[str] | None = None,
-    keys: Container[str] | None = None,
+def _messages_of(
+    chunk: bytes, wanted: dict[int, str | None], key_if_wanted: Callable[[str], str | None]
 ) -> Iterator[ChunkEntry]:
-    """Entries of one chunk.
+    """Entries of the records of a chunk.
 
-    Args:
-        chunk: its records, uncompressed.
-        wanted: keys by channel, None for one that is not wanted; learns them as they pass by.
-        names: of topics that are wanted; None: all, also of keys outside the table.
-        keys: that are wanted; None: all.
-
-    Raises:
-        one of CORRUPT: the chunk holds what are no records.
+    `wanted` has keys by channel, None for one that is not wanted; it learns them as they pass by.
+    Raises one of CORRUPT of what are no records.
     """
     at = 0
     while at < len(chunk):
@@ -217,10 +222,9 @@ def messages_of(
             opcode, length = RECORD.unpack_from(chunk, at)
             at += RECORD.size
             channel_id = int.from_bytes(chunk[at : at + 2], "little")
-            if opcode == Opcode.CHANNEL and channel_id not in wanted:  # every chunk repeats them
+            if opcode == Opcode.CHANNEL and channel_id not in wanted:
                 key = Channel.read(stream(chunk[at : at + length])).topic
-                named = names is None or name_of(key) in names
-                wanted[channel_id] = key if named and (keys is None or key in keys) else None
+                wanted[channel_id] = key_if_wanted(key)
             at += length
             continue
         _, length, channel_id, _, log_time, _ = _MESSAGE.unpack_from(chunk, at)
@@ -242,19 +246,15 @@ def content_of(record: bytes) -> bytes:
     """
     chunk = Chunk.read(stream(record))
     size: int = chunk.uncompressed_size
-    if chunk.compression not in ("", "lz4", "zstd") or size > LARGEST_CHUNK:
+    if chunk.compression not in ("lz4", "zstd") or size > LARGEST_CHUNK:
         raise ValueError(f"{size} bytes packed with {chunk.compression[:16]!r}")
-    content: bytes = chunk.data
+    content: bytes
     if chunk.compression == "lz4":
         unpack = lz4.frame.LZ4FrameDecompressor()
         content = unpack.decompress(chunk.data, max_length=size + 1)
-    elif chunk.compression:
-        if zstandard.frame_content_size(chunk.data) not in (size, -1):
-            raise ValueError(f"a frame that does not unpack to {size} bytes")  # nor is allocated
+    else:
         content = zstandard.ZstdDecompressor().decompress(chunk.data, max_output_size=size)
-    if len(content) != size:
-        raise ValueError(f"{len(content)} bytes where {size} were packed")
-    if chunk.uncompressed_crc and zlib.crc32(content) != chunk.uncompressed_crc:
+    if len(content) != size or zlib.crc32(content) != chunk.uncompressed_crc:
         raise ValueError("its checksum is wrong")
     return content
 

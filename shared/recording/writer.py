@@ -17,7 +17,7 @@ from mcap.writer import CompressionType, Writer
 
 from quadriga.shared.codec import envelope
 from quadriga.shared.errors import RecordingError, name_file_errors
-from quadriga.shared.recording.metadata import CHANNELS, COUNTS, LOST, PROFILE, SINCE, seal
+from quadriga.shared.recording.metadata import CHANNELS, COUNTS, LOST, PROFILE, seal
 from quadriga.shared.recording.quota import OVERSIZED, REFUSED, Quota
 from quadriga.shared.recording.ticks import TickTrack, lost_by_key
 from quadriga.shared.schema import json_schema
@@ -34,12 +34,11 @@ class RecordingWriter:
     """Writes messages as sent: topic = key, log time = reception, publish time = world time.
 
     A message whose envelope cannot be read is written all the same, with its log time as
-    publish time, and counted.
+    publish time.
 
     Attributes:
         quota: what is not written, and how much of that there was.
         messages: how many were written.
-        unreadable: how many of them carry no readable tick and stamp.
     """
 
     def __init__(
@@ -67,7 +66,7 @@ class RecordingWriter:
             RecordingError: the file exists or cannot be created.
         """
         self.quota = quota or Quota()
-        self.messages = self.unreadable = 0
+        self.messages = 0
         if path.exists():
             cause = "recordings are never overwritten"
             raise RecordingError(str(path), "a file that exists", "a new one", cause)
@@ -120,8 +119,6 @@ class RecordingWriter:
             row = self._channels[key] = self._channel(key)
         channel, track = row
         tick, publish_time = envelope(payload) or (-1, log_time_ns)
-        if tick < 0:
-            self.unreadable += 1
         self._mcap.add_message(channel, log_time_ns, payload, publish_time, track.count)
         self._open += MESSAGE_SIZE + len(payload)
         track.note(tick)
@@ -149,13 +146,10 @@ class RecordingWriter:
         """
         if self._file.closed:
             return
-        tracks = self.tracks
-        since = {key: track.first for key, track in sorted(tracks.items())}
-        counts = {"messages": self.messages, "unreadable": self.unreadable}
-        counts |= self.quota.refused
+        counts = {"messages": self.messages, **self.quota.refused}
         with self._file:  # closed also if the disk is full
             self._close_chunk()
-            for name, values in ((COUNTS, counts), (LOST, lost_by_key(tracks)), (SINCE, since)):
+            for name, values in ((COUNTS, counts), (LOST, lost_by_key(self.tracks))):
                 self.note(name, {key: str(value) for key, value in values.items()})
             self.note(PROFILE, self._metadata)
             self._mcap.finish()

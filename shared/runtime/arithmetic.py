@@ -20,13 +20,11 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
-import llvmlite.binding
 import numba
 import numpy as np
 import scipy.linalg  # noqa: F401  (loads the BLAS that is asked about)
 from threadpoolctl import threadpool_info, threadpool_limits
 
-_DECIDES_NOTHING: Final = ("cpu", "numba's processor")  # for a reader: they decide on no bit
 _PACKAGES: Final = ("numpy", "scipy", "numba", "llvmlite", "pin", "libpinocchio", "daqp")
 
 
@@ -39,31 +37,19 @@ def arithmetic() -> dict[str, str]:
     )
     simd = np.show_config(mode="dicts")["SIMD Extensions"]
     return {
-        "cpu": _cpu(),
         "machine": platform.machine(),
         "libc": f"{' '.join(platform.libc_ver())} {_libm()}",
         "python": ".".join(platform.python_version_tuple()[:2]),
         "BLAS": ", ".join(cores),
         "numpy's SIMD": " ".join(simd.get("found", [])) or "baseline",
-        "numba's processor": numba.config.CPU_NAME or llvmlite.binding.get_host_cpu_name(),
         **{name: importlib.metadata.version(name) for name in _PACKAGES},
     }
-
-
-def differences(here: dict[str, str], there: dict[str, str]) -> list[str]:
-    """What differs between two machines, in words; empty if their last bits must be equal."""
-    return [
-        f"{name} {here.get(name, 'unknown')!r} instead of {there.get(name, 'unknown')!r}"
-        for name in sorted(here.keys() | there.keys())
-        if name not in _DECIDES_NOTHING and here.get(name) != there.get(name)
-    ]
 
 
 @lru_cache(maxsize=1)
 def arithmetic_digest() -> str:
     """Digest of what decides on the last bits here: equal digests, equal bytes."""
-    deciding = {k: v for k, v in arithmetic().items() if k not in _DECIDES_NOTHING}
-    text = json.dumps([deciding, bool(numba.config.DISABLE_JIT)], sort_keys=True)
+    text = json.dumps([arithmetic(), bool(numba.config.DISABLE_JIT)], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:8]
 
 
@@ -82,7 +68,8 @@ def _libm() -> str:
     return hashlib.sha256(struct.pack(f"<{len(values)}d", *values)).hexdigest()[:8]
 
 
-def _cpu() -> str:
+def processor() -> str:
+    """What this machine's processor is called, for a reader: it decides on no bit."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:

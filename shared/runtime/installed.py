@@ -6,12 +6,9 @@ import hashlib
 import importlib.metadata
 import os
 import platform
-import re
 import sys
-from collections.abc import Sequence
 from contextlib import suppress
 from functools import cache
-from importlib.machinery import PathFinder
 from pathlib import Path
 from typing import Final
 
@@ -50,39 +47,6 @@ def code_digest() -> str:
     for name, path in sorted((path.relative_to(folder).as_posix(), path) for path in found):
         digest.update(f"\0{name}\0".encode() + path.read_bytes())
     return digest.hexdigest()[:16]
-
-
-def shadowing_files(folders: Sequence[str] = ()) -> list[str]:
-    """Files that Python imports in the place of its own modules or of packages needed here.
-
-    Args:
-        folders: where to look; by default all that come before Python's own, as of PYTHONPATH.
-    """
-    own = str(Path(os.__file__).parent)
-    before = folders or sys.path[: sys.path.index(own)]
-    behind = sys.path[sys.path.index(own) :]
-    found = ((PathFinder.find_spec(name, before), name) for name in sorted(_needed_modules()))
-    return [
-        spec.origin
-        for spec, name in found
-        if spec and spec.origin and PathFinder.find_spec(name, behind)
-    ]
-
-
-def _needed_modules() -> set[str]:
-    """Names of Python's modules and of those of all packages that this project needs."""
-    names, todo, seen = {*sys.stdlib_module_names}, [PROJECT], {PROJECT}
-    while todo:
-        with suppress(importlib.metadata.PackageNotFoundError):
-            package = importlib.metadata.distribution(todo.pop())
-            files = (
-                file.as_posix().rpartition("site-packages/")[2] for file in package.files or ()
-            )
-            names |= {re.split(r"[/.]", file)[0] for file in files}
-            needs = {re.split(r"[^\w.-]", n)[0] for n in package.requires or () if ";" not in n}
-            todo += needs - seen
-            seen |= needs
-    return names
 
 
 @cache

@@ -18,7 +18,6 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Final
 
-from quadriga.shared.errors import QuadrigaError
 from quadriga.shared.runtime.places import SOURCE, cache_dir
 
 _PACKAGES: Final = ("agents", "bridges", "plant", "shared", "sim_server")
@@ -38,13 +37,10 @@ def followed_files(root: Path, modules: Iterable[str]) -> list[Path]:
 
     Args:
         root: the folder that the packages lie in.
-        modules: dotted names, for instance `quadriga.agents.agent`.
-
-    Raises:
-        QuadrigaError: there is no module, or no file of one.
+        modules: dotted names, for instance `quadriga.agents.agent`; one without a file is left out.
     """
     todo = [*modules]
-    own, wanted = {name.partition(".")[0] for name in todo}, {*todo}
+    own = {name.partition(".")[0] for name in todo}
     found: dict[str, Path | None] = {}
     while todo:
         name = todo.pop()
@@ -62,10 +58,6 @@ def followed_files(root: Path, modules: Iterable[str]) -> list[Path]:
         for package in _CHOICE.findall(text):
             folder = root.joinpath(*package.split("."))
             todo += [f"{package}.{file.stem}" for file in folder.glob("[!_]*.py")]
-    missing = sorted(name for name in wanted if found[name] is None)
-    if missing or not wanted:
-        got = f"no file of {', '.join(missing)}" if missing else "none"
-        raise QuadrigaError("modules whose imports to follow", got, f"some below {root}")
     return sorted(filter(None, found.values()))
 
 
@@ -74,9 +66,6 @@ def sources(root: Path) -> list[Path]:
 
     Args:
         root: the folder of this project's package `quadriga`.
-
-    Raises:
-        QuadrigaError: no file has compiled functions.
     """
     files = (file for name in _PACKAGES for file in (root / "quadriga" / name).rglob("*.py"))
     marked = (file for file in files if _MARK in file.read_text(encoding="utf-8"))

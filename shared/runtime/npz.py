@@ -17,11 +17,7 @@ import numpy as np
 from numpy.lib.npyio import NpzFile
 from numpy.typing import NDArray
 
-# Bytes of all arrays together: at most so many, and so many times those of their file. What a walk
-# measures packs to a half; only much of nothing packs to less than a twentieth.
-_LARGEST: Final = 1 << 31
-_UNPACKED: Final = 20
-_ALWAYS: Final = 1 << 26  # so many are read of the smallest file
+_LARGEST: Final = 1 << 31  # bytes of all arrays together
 _ARCHIVE: Final = b"PK\x03\x04"  # else NumPy takes it for a bare array, of any size
 GREATEST: Final = 1e15  # that anything measured can be, whatever its unit
 _NUMBERS: Final = "fiu"  # NumPy's kinds of types
@@ -83,6 +79,6 @@ def open_npz(path: Path) -> Iterator[NpzFile]:
         file.seek(0)
         with np.load(file, allow_pickle=False) as archive:
             size = sum(member.file_size for member in archive.zip.infolist())
-            if size > min(_LARGEST, _ALWAYS + _UNPACKED * path.stat().st_size):
+            if size > _LARGEST:
                 raise ValueError(f"arrays of {size:,} bytes")
             yield archive

@@ -20,10 +20,8 @@ from quadriga.shared.errors import QuadrigaError
 from quadriga.shared.printable import printable_line
 from quadriga.shared.recording.metadata import PROFILE, seal
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.recording.recover import DamagedRecording
 from quadriga.shared.recording.writer import RecordingWriter
 from quadriga.shared.topics import TABLE
-from tests.fuzz.arrays import SMALL
 from tests.fuzz.damage import damage
 from tests.fuzz.target import example
 from tests.shared.recording.test_reader import append_to_chunk
@@ -33,7 +31,10 @@ class Recordings:
     """Recordings, damaged, and such as somebody made with right checksums."""
 
     def __init__(self, folder: Path) -> None:
-        self._path, config = folder / "run.mcap", load(None, SMALL)
+        self._path, config = (
+            folder / "run.mcap",
+            load(None, {"team.robots": 1, "planner.kind": "none"}),
+        )
         self._metadata = build_metadata(config, "")
         self._payloads = [(t.key("team", "r1"), encode(example(t.type))) for t in TABLE]
         good = folder / "good.mcap"
@@ -73,7 +74,7 @@ class Recordings:
             list(recording.entries())
             recording.require_whole()
         with suppress(QuadrigaError):
-            list(DamagedRecording(self._path).entries())
+            list(Recording(self._path, salvage=True).entries())
         with suppress(QuadrigaError):
             format_findings(check(self._path))
         self._recover()

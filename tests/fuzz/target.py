@@ -41,7 +41,6 @@ VALUES: Final = (
     "'r1:r1:r1'",
     "'0:99999999999999'",
 )
-_JSON: Final = (*_ANYWHERE, '{"a":' * 3000, "NaN", "null", "{}", '"\\ud800"', "[[1]]")
 
 Change = Callable[[bytes, np.random.Generator], bytes]
 
@@ -94,41 +93,6 @@ def file_reader(
 def choose(known: Sequence[bytes], random: np.random.Generator) -> bytes:
     """One of them."""
     return known[int(random.integers(len(known)))]
-
-
-def change_json(good: bytes, random: np.random.Generator) -> bytes:
-    """A JSON text with a value that it should not have, or damaged anyhow."""
-    text = good.decode()
-    # What stands between a mark of JSON's and the next: a value, a name, or a part of a text.
-    marks = [at for at, letter in enumerate(text) if letter in ":,[]{}"]
-    if random.random() < 0.5 or len(marks) < 2:
-        return damage(good, random)
-    begin = int(random.integers(len(marks) - 1))
-    value = _JSON[int(random.integers(len(_JSON)))]
-    return (text[: marks[begin] + 1] + value + text[marks[begin + 1] :]).encode()
-
-
-def change_toml(good: bytes, random: np.random.Generator) -> bytes:
-    """A TOML text some of whose lines are missing, or have a value that is none."""
-    changed = _toml_lines(good.decode())
-    for at in random.integers(len(changed), size=int(random.integers(4))):
-        name, equals, _ = changed[int(at)].partition(" = ")
-        value = VALUES[int(random.integers(len(VALUES)))]
-        changed[int(at)] = f"{name} = {value}" if equals and random.random() < 0.7 else ""
-    text = "\n".join(changed).encode()
-    return text if random.random() < 0.7 else damage(text, random)
-
-
-def _toml_lines(text: str) -> list[str]:
-    """The lines of a TOML text; a value of several lines is one."""
-    lines = list[str]()
-    for line in text.splitlines():
-        begins = line.startswith(("[", "#")) or (" = " in line and not line.startswith(" "))
-        if begins or not lines or not line:
-            lines.append(line)
-        else:
-            lines[-1] += "\n" + line
-    return lines
 
 
 def example(kind: type[Message], tick: int = 5) -> Message:

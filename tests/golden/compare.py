@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from itertools import zip_longest
 
@@ -22,6 +22,15 @@ REMEDY = (
     "If this change of behaviour is meant, state it and renew the recording:\n"
     '    python -m tests.golden.renew --reason "what the agents do differently now, and why"'
 )
+
+
+def differences(here: Mapping[str, str], there: Mapping[str, str]) -> list[str]:
+    """What decides on the last bits of two machines and differs, in words."""
+    return [
+        f"{name} {value!r} instead of {there.get(name, 'unknown')!r}"
+        for name, value in sorted(here.items())
+        if value != there.get(name)
+    ]
 
 
 def first_difference(recorded: Packets, recomputed: Packets) -> Difference | None:

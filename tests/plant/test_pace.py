@@ -133,8 +133,8 @@ def of_clock(ahead_ms: float) -> MemberAnswer:
 @pytest.mark.parametrize(
     ("said", "got"),
     [
-        (of_clock(3.0), "3 ms behind that of plant_r1"),
-        (of_clock(-7200e3), "7.2e+03 s ahead of that of plant_r1"),
+        (of_clock(3.0), "3.0 ms behind that of plant_r1"),
+        (of_clock(-7200e3), "7,200,000.0 ms ahead of that of plant_r1"),
         (None, "no answer of plant_r1"),
     ],
 )

@@ -14,7 +14,6 @@ from quadriga.plant.protocol import Plant
 from quadriga.plant.server import FALL_LINGER_MS, PlantServer
 from quadriga.shared import codes
 from quadriga.shared.bus.session import Bus
-from quadriga.shared.bus.standstill import Standstill
 from quadriga.shared.codec import MAX_TEXT, decode, encode
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.messages import Clock, Command, Event, State
@@ -29,7 +28,6 @@ class Listener:
     def __init__(self) -> None:
         self.packets: list[tuple[str, bool, bytes]] = []
         self.arrived: list[tuple[str, bytes]] = []
-        self.standstill = Standstill()
 
     def publisher(
         self, key: str, *, droppable: bool = False, urgent: bool = False
@@ -165,15 +163,3 @@ def test_an_unstable_simulation_ends_the_walk_at_once_and_is_an_error() -> None:
     assert listener.events()[-1].code == codes.UNSTABLE
     with pytest.raises(ProcessError, match="got unstable simulation: "):
         _check_end(end, "team", 1)
-
-
-def test_a_plant_that_itself_stood_still_says_so_of_robots_that_are_silent() -> None:
-    server, listener = served()
-    now = [0.0]
-    listener.standstill = Standstill(lambda: now[0], lambda: 0)
-    listener.standstill.begin()
-    now[0] = 20.0
-    listener.standstill.look()
-    server.end_without({"r1"}, "silent for 10 s")
-    assert server.time.end is not None
-    assert server.time.end.detail == "r1 silent for 10 s; this process stood still for 20.0 s"

@@ -61,32 +61,32 @@ def test_a_plant_is_silent_whose_newest_message_is_too_old(robot: str) -> None:
     for key, said in heard.items():
         time.take(key, said(700), 690)
         time.take(key, said(9999), 700)  # it may be ahead, of one that was late, but not by seconds
-    time.look(EVERYBODY, 1200, "")
+    time.look(EVERYBODY, 1200)
     assert time.end is None
-    time.look(EVERYBODY, 1201, "; it slept")
+    time.look(EVERYBODY, 1201)
     silent = "plant_r2, plant_r3" if robot == "r1" else "plant_r1"
-    assert time.end == (codes.PLANT_GONE, f"{silent} silent for 0.5 s; it slept")
+    assert time.end == (codes.PLANT_GONE, f"{silent} silent for 0.5 s")
 
 
 @pytest.mark.parametrize("heard", [True, False])
 def test_the_announced_end_may_come_after_who_drives_time_has_left(heard: bool) -> None:
     time = TeamTime(CONFIG, "r2")
     for _ in range(9):
-        time.look(EVERYBODY - {"plant_r1"}, 0, "")
+        time.look(EVERYBODY - {"plant_r1"}, 0)
     assert time.end is None
     if heard:
         time.take(EVENT.key("team"), encode(Event.of(5, codes.TIME_OVER, "r1", "")), 5)
-    time.look(EVERYBODY - {"plant_r1"}, 0, "")
+    time.look(EVERYBODY - {"plant_r1"}, 0)
     assert time.end == ((codes.TIME_OVER, "") if heard else (codes.PLANT_GONE, "plant_r1 gone"))
 
 
 def test_who_drives_time_ends_at_once_without_another_plant() -> None:
     time = TeamTime(CONFIG, "r1")
-    time.look(EVERYBODY - {"plant_r3"}, 0, "")
+    time.look(EVERYBODY - {"plant_r3"}, 0)
     assert time.end == (codes.PLANT_GONE, "plant_r3 gone")
 
 
 def test_the_plant_of_all_robots_depends_on_nobody() -> None:
     time = TeamTime(CONFIG)
-    time.look((), 10**6, "")
+    time.look((), 10**6)
     assert (time.drives, time.alone, time.keys, time.end) == (True, True, frozenset(), None)

@@ -181,18 +181,13 @@ def test_what_the_recording_lacks_the_world_has_told(write_run: WriteRun) -> Non
     assert row["recover_ms"] is None  # what the robots did then nobody has recorded
 
 
-def test_a_world_that_is_gone_is_noticed_when_the_first_process_misses_it(
-    write_run: WriteRun,
-) -> None:
+def test_a_world_that_is_gone_is_noticed_when_the_recorder_misses_it(write_run: WriteRun) -> None:
     folder = write_run(CONFIG)
     recording = Recording(folder / "run.mcap")
     moment = Moment("r2", FAULT, wall(FAULT))
     gone = {"code": codes.LEAD_GONE, "tick": "3010", "missed_ns": str(wall(FAULT) + 31_000_000)}
     traces = replace(read_traces(recording), notes={END: gone})
     assert describe_outcome(CONFIG, traces, recording, moment)["detect_ms"] == 31
-    before, after = wall(FAULT) - 5_000_000, wall(FAULT) + 12_000_000
-    row = describe_outcome(CONFIG, traces, recording, moment, missed=[before, after])
-    assert row["detect_ms"] == 12
 
 
 def test_a_fault_whose_tick_nobody_knows_is_where_the_walk_was_by_the_clock(

@@ -24,7 +24,7 @@ from quadriga.shared.config.sections import BusConfig, Config, RecorderConfig, T
 from quadriga.shared.config.write import to_toml
 from quadriga.shared.members import RECORDER, SIM
 from quadriga.shared.messages import Command, Consumed, Plan, Reference
-from quadriga.shared.recording.metadata import LOST, SINCE
+from quadriga.shared.recording.metadata import LOST
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns
 from quadriga.team.endpoint import free_endpoint
@@ -119,7 +119,7 @@ def test_joining_late_says_what_it_missed_and_counts_what_is_lost(
     recording = Recording(tmp_path / "run.mcap")
     recording.require_whole()
     assert recording.notes[LOST] == {"band/r1/state": "11"}
-    assert recording.notes[SINCE] == {"band/r1/state": "4000"}
+    assert next(recording.entries()).tick == 4000
 
 
 def test_commands_of_ticks_that_an_agent_passed_over_are_not_lost(
@@ -318,7 +318,7 @@ def test_a_full_file_system_is_named(start: Start, world: Bus, tmp_path: Path) -
 
 @pytest.mark.parametrize("lost", [0, 7])
 def test_at_once_waits_for_no_team(config: Config, start: Start, tmp_path: Path, lost: int) -> None:
-    """Lost messages are a failure; who was frozen meanwhile says so."""
+    """Lost messages are a failure."""
     with Bus.open(config.bus, "band", SIM) as hub:  # it never says that it is there
         recorder = start(hub, "--now")
         plan = Plan(40, 40, 1, np.zeros((25, 12)), np.zeros((25, 6)), "solved", {}, 0)
@@ -328,15 +328,14 @@ def test_at_once_waits_for_no_team(config: Config, start: Start, tmp_path: Path,
         await_recorded(tmp_path / "run.mcap", 3)
         if lost:
             recorder.send_signal(signal.SIGSTOP)
-            sleep(2.5)
+            sleep(0.5)
             recorder.send_signal(signal.SIGCONT)
         hub.publisher("band/r1/state")(encode(state(11 + lost)))
         await_recorded(tmp_path / "run.mcap", 4)
         recorder.terminate()
-        out, err = recorder.communicate(timeout=WAIT)
+        out, _ = recorder.communicate(timeout=WAIT)
     assert recorder.returncode == bool(lost)
     assert f"4 messages, {lost} lost" in out
-    assert not lost or "this process stood still for" in err
     assert len(list(Recording(tmp_path / "run.mcap").entries())) == 4
 
 

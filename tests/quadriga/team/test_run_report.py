@@ -17,7 +17,7 @@ from tests.quadriga.conftest import WriteRun, run_config
 
 
 def event(code: str, robot: str, detail: str) -> list[tuple[str, Event]]:
-    kind = codes.EVENTS[code].kind
+    kind = codes.EVENTS[code]
     return [("team/sim/event", Event(1000, 10**9, kind, robot, detail, code))]
 
 

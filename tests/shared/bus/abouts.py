@@ -33,9 +33,6 @@ def about(name: str, **changes: Any) -> About:
     return replace(SIM, **given)
 
 
-PLANNER: Final = about("r1", predictor="ab" * 32)
-
-
 def answer(said: About | None, took_ns: int = 10**6) -> MemberAnswer:
     """An answer for which the asker waited so long, and whose clock is the asker's."""
     return MemberAnswer(said, 10**18 - took_ns // 2, 10**18 + took_ns // 2)
@@ -46,4 +43,4 @@ def view(*said: About, **changes: Any) -> TeamView:
     answers: dict[str, list[MemberAnswer]] = {}
     for item in said:
         answers.setdefault(item.name, []).append(answer(item))
-    return replace(TeamView(True, NAMES, frozenset(), NAMES, answers, SIM, PLANNER), **changes)
+    return replace(TeamView(True, NAMES, frozenset(), NAMES, answers, SIM), **changes)

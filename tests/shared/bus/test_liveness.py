@@ -8,25 +8,16 @@ from contextlib import contextmanager
 import pytest
 
 from quadriga.shared.bus import liveness
-from quadriga.shared.bus.liveness import (
-    Liveness,
-    Loss,
-    LossTimer,
-    find_loss,
-    loss_error,
-    missed_ns_of,
-)
+from quadriga.shared.bus.liveness import Liveness, find_loss
 from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.codes import LEAD_GONE, LINK_LOST
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.members import SIM
-from quadriga.shared.runtime.clock import monotonic, sleep, wall_ns
+from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.team.endpoint import free_endpoint
 from tests.shared.bus.test_session import WAIT, wait_until
-
-LOSS = Loss(LEAD_GONE, "process sim")
 
 
 @pytest.fixture(autouse=True)
@@ -60,15 +51,14 @@ def test_who_drives_time_is_missed_after_its_last_words() -> None:
         watch.poll(1)
         assert not watch.is_over(announced=False)
         assert not watch.is_over(announced=True)
-        left_ns, begun = wall_ns(), monotonic()
+        begun = monotonic()
         sim.close()
         wait_until(lambda: not r1.members_at(HERE))
         assert find_loss(r1, config) == (LEAD_GONE, "process sim of team 'team', seen by r1")
-        said, ended_ns = complaint(watch, 1234), wall_ns()
+        said = complaint(watch, 1234)
         assert monotonic() - begun >= 0.2
         assert watch.is_over(announced=True)
         assert not watch.is_over(announced=False), "then it is missed"
-    assert left_ns - 1_000_000 <= missed_ns_of(said) <= ended_ns - round(0.2e9)
     assert said.startswith(
         "process sim of team 'team', seen by r1: got none any more after 1.234 s of the walk"
     )
@@ -107,24 +97,17 @@ def test_a_link_that_is_gone_is_named_and_not_those_behind_it(mode: str) -> None
 def test_who_is_back_in_time_is_not_missed() -> None:
     config = load(None, {"bus.endpoint": free_endpoint()})
     with together(config) as (sim, r1):
-        timer = LossTimer(r1, config, 0.2)
+        watch = Liveness(r1, config)
         sim.close()
         wait_until(lambda: not r1.members_at(HERE))
-        assert timer.poll() is None
+        watch.poll(1)
         with Bus.open(config.bus, "team", SIM) as again:
             again.declare(HERE)
             wait_until(lambda: r1.members_at(HERE))
             sleep(0.25)
-            assert timer.poll() is None
+            watch.poll(1)
         wait_until(lambda: not r1.members_at(HERE))
-        assert timer.poll() is timer.poll() is None
+        watch.poll(1)
         sleep(0.25)
-        assert timer.poll() == find_loss(r1, config) is not None
-
-
-def test_a_line_tells_since_when_something_is_missed() -> None:
-    missed_ns = 1_796_000_000_123_000_000
-    said = str(loss_error(LOSS, 2500, missed_ns))
-    assert "after 2.500 s of the walk, missed since 2026-11-30T00:53:20.123Z, expected" in said
-    assert missed_ns_of(f"quadriga: {said}") == missed_ns
-    assert missed_ns_of(str(loss_error(LOSS, 2500))) == 0
+        with pytest.raises(ProcessError):
+            watch.poll(1)

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
-from quadriga.shared.errors import QuadrigaError
 from quadriga.shared.runtime import jit_cache, places
 from quadriga.shared.runtime.jit_cache import followed_files
 
-COPIED = ("runtime/jit.py", "runtime/jit_cache.py", "errors.py", "runtime/places.py")
+COPIED = ("runtime/jit.py", "runtime/jit_cache.py", "runtime/places.py")
 SHARED = places.SOURCE / "quadriga" / "shared"
 FILES = {
     **{f"quadriga/shared/{name}": (SHARED / name).read_text(encoding="utf-8") for name in COPIED},
@@ -90,27 +87,6 @@ def test_so_it_is_in_a_folder_that_the_user_names(package: Path, tmp_path: Path)
     assert not list((package / "quadriga/shared/__pycache__").glob("compiled-*"))
 
 
-def test_what_is_empty_or_damaged_is_compiled_anew(package: Path) -> None:
-    assert run(package) == (2.5, 0)
-    kept = package / "quadriga/shared/__pycache__"
-    for pattern, length, hits in (("*.nbc", -9, 0), ("*.nbi", 0, 0), ("none", 0, 1)):
-        for file in kept.rglob(pattern):
-            code = file.read_bytes()
-            file.write_bytes(code[:length] and code[:length] + bytes(-length))
-        assert run(package) == (2.5, hits), pattern
-
-
-def test_on_a_full_disk_only_what_is_complete_is_used(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(free=4096))
-    assert jit_cache.compiled_folder.__wrapped__() is None
-    (folder,) = tmp_path.glob("compiled-*")
-    (folder / jit_cache.REHEARSED).touch()
-    assert jit_cache.compiled_folder.__wrapped__() == folder
-
-
 def test_the_sources_are_those_with_compiled_functions_and_what_they_import() -> None:
     root = places.SOURCE
     found = {str(path.relative_to(root)) for path in jit_cache.sources(root)}
@@ -138,11 +114,3 @@ def test_every_form_of_an_import_is_followed(tmp_path: Path, text: str) -> None:
     found = {str(path.relative_to(tmp_path)) for path in followed_files(tmp_path, ["pack.a"])}
     wanted = {"pack/__init__.py", "pack/a.py", "pack/room/__init__.py", "pack/room/c.py"}
     assert found - {"pack/b.py"} == wanted
-
-
-def test_a_missing_module_and_none_at_all_are_errors(tmp_path: Path) -> None:
-    put(tmp_path, "pack/a.py", "")
-    with pytest.raises(QuadrigaError, match=r"got no file of pack\.gone"):
-        followed_files(tmp_path, ["pack.a", "pack.gone"])
-    with pytest.raises(QuadrigaError, match="got none"):
-        followed_files(tmp_path, [])

@@ -30,17 +30,3 @@ def test_what_nobody_measures_is_refused(array: object) -> None:
 
 def test_gaps_are_taken_where_they_may_be() -> None:
     assert np.isnan(as_measured("x", [np.nan], 1, gaps=True)).all()
-
-
-@pytest.mark.parametrize(("mega_bytes", "taken"), [(60, True), (200, False)])
-def test_what_unpacks_to_much_of_nothing_is_refused(
-    tmp_path: Path, mega_bytes: int, *, taken: bool
-) -> None:
-    path = tmp_path / "bomb.npz"
-    np.savez_compressed(path, a=np.zeros(mega_bytes * 125_000))
-    if taken:
-        with open_npz(path) as archive:
-            assert archive["a"].nbytes == mega_bytes * 1_000_000
-        return
-    with pytest.raises(ValueError, match="arrays of 200,"), open_npz(path):
-        pass
