@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
 from dataclasses import replace
 
 import pytest
@@ -30,6 +31,7 @@ from tests.runtime.conftest import (
     Make,
     Team,
     Watcher,
+    await_packet,
     await_tick,
     router,
     run_command,
@@ -189,6 +191,26 @@ def test_the_world_obeys_an_emergency_stop_whatever_the_agents_do(
             team.await_log("sim", text)
         running.watch(lambda: True)
     assert "fall of" not in team.log("sim")
+
+
+def test_an_emergency_stop_waits_for_nobody(make_team: Make, watcher: Watcher) -> None:
+    """Also where it is meant for a robot that is not there, which then is named."""
+    team = make_team(world__duration=FOREVER)
+    larger = replace(team.config, team=replace(team.config.team, robots=3))
+    (team.folder / "larger").mkdir()
+    file = Team(larger, team.folder / "larger").file
+    with team.launch() as running:
+        team.await_log("sim", BEGUN)
+        bus = watcher(team)
+        estop = (*launch.QUADRIGA, "estop", "--config", file)
+        with subprocess.Popen(estop, stderr=subprocess.PIPE, text=True) as stop:
+            await_packet(bus, lambda key, _: key.endswith("/estop"))
+            assert stop.poll() is None, "it still looks for r3"
+            _, errors = stop.communicate(timeout=WAIT)
+        running.watch(lambda: True)
+    assert stop.returncode == 2
+    assert "no r3 on the bus after 5 s" in errors
+    assert "sent to r1, r2, sim at once" in errors
 
 
 @pytest.mark.parametrize(

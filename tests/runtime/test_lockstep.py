@@ -57,6 +57,14 @@ def within(team: Team, name: str, config: Config | None = None) -> Team:
     return replace(team, folder=folder, config=config or team.config)
 
 
+def test_the_end_comes_a_second_after_a_fall(make_team: Make) -> None:
+    team = make_team(recorder__enabled=True, world__duration=9.0, world__push="r1:2000:0:0.1:0.2")
+    events = list(team.run().messages(Event))
+    fall = next(m for m in events if m.kind == "fall")
+    assert (events[-1].kind, events[-1].tick) == ("stop", fall.tick + 1000)
+    assert "fall of" in events[-1].detail
+
+
 @pytest.mark.usefixtures("_compiled")
 def test_two_runs_of_one_scenario_give_the_same_bytes(make_team: Make) -> None:
     team = make_team(recorder__enabled=True, world__duration=0.8, estimator__kind="kalman")

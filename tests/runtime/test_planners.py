@@ -2,29 +2,38 @@
 
 from __future__ import annotations
 
+import os
+import signal
 from collections import defaultdict
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from rich.console import Console
 
 from quadriga.agents.gait import first_step, step_ms
+from quadriga.agents.planning.references import AHEAD_MS
 from quadriga.agents.predictor.gates import load_checked as load_predictor
 from quadriga.identification.central_planner import build_central_planner
 from quadriga.identification.predictors import ensure_predictor
 from quadriga.identification.rollout import Rollout
+from quadriga.shared.bus.liveness import LAST_PACKETS
+from quadriga.shared.bus.session import Bus
 from quadriga.shared.codec import encode
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import to_toml
+from quadriga.shared.messages import Event, Plan
 from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.robots.conventions import robot_names
+from quadriga.shared.runtime.clock import sleep
+from quadriga.shared.topics import CLOCK, EVENT
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import Launch, process_table
 from quadriga.team.operator import reference_at
 from tests.golden.compare import first_difference
-from tests.runtime.conftest import DATA
+from tests.runtime.conftest import DATA, await_tick
 
 pytestmark = pytest.mark.usefixtures("_compiled")
 
@@ -94,3 +103,26 @@ def test_the_bus_changes_nothing(kind: str, tmp_path: Path) -> None:
         steps = len(range(begin, round(1000 * SECONDS), step_ms(config)))
         assert len(together[f"team/{name}/plan"]) == pytest.approx(steps * exchanges, abs=exchanges)
         assert len(alone[f"team/{name}/command"]) == 1000 * SECONDS
+
+
+def test_a_central_planner_outlives_a_false_end_and_a_pause_after_it(tmp_path: Path) -> None:
+    """Who believes in an end leaves as soon as the world has been silent for a while."""
+    config = config_of("centralised")
+    config = replace(config, world=replace(config.world, duration=3.0))
+    predictor = ensure_predictor(config, Console(stderr=True))
+    (tmp_path / "config.toml").write_text(to_toml(config), encoding="utf-8")
+    with (
+        Launch(process_table(config, tmp_path, predictor, ""), tmp_path / "logs") as running,
+        Bus.open(config.bus, config.team.name, "watcher") as bus,
+    ):
+        bus.subscribe(CLOCK.key(config.team.name))
+        now = await_tick(bus, 1000, CLOCK)
+        false = Event.of(1 << 41, "signal", "", "forged")
+        bus.publisher(EVENT.key(config.team.name))(encode(false))
+        await_tick(bus, now + AHEAD_MS + 200, CLOCK)
+        os.kill(running.pids["sim"], signal.SIGSTOP)
+        sleep(LAST_PACKETS + 0.5)
+        os.kill(running.pids["sim"], signal.SIGCONT)
+        running.watch(lambda: False)
+    steps = [plan.step for plan in Recording(tmp_path / "run.mcap").messages(Plan, "r1")]
+    assert steps[-1] == (3000 - 1) // step_ms(config)

@@ -61,6 +61,18 @@ def test_a_plant_of_another_package_walks(puppets: Make, keys: dict[str, Any]) -
 
 
 @pytest.mark.nightly
+def test_a_fall_in_one_world_ends_the_walk_of_all(make_team: Make) -> None:
+    push = "r2:2000:0:0.1:0.2"
+    team = make_team(recorder__enabled=True, world__duration=9.0, world__push=push, **EACH)
+    events = list(team.run().messages(Event))
+    fall = next(e for e in events if e.kind == "fall")
+    stop = next(e for e in events if e.kind == "stop")
+    assert (fall.robot, stop.code, stop.tick) == ("r2", "fallen", fall.tick + 1000)
+    assert stop.detail.startswith("fall of r2;")
+    assert [e.kind for e in events].count("start") == 1
+
+
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("dies", "other", "number"),
     [(2, 1, signal.SIGTERM), (2, 1, signal.SIGKILL), (1, 2, signal.SIGKILL)],

@@ -181,6 +181,16 @@ def test_a_walk_that_is_stopped_at_any_moment_ends_and_leaves_nobody(
     await_nobody(out)
 
 
+def test_a_folder_with_a_recording_is_not_overwritten(out: Path, start: Start) -> None:
+    out.mkdir()
+    (out / "run.mcap").write_bytes(b"precious")
+    walk = start()
+    _, errors = walk.communicate(timeout=WAIT)
+    assert walk.returncode == 2
+    assert "expected a new folder" in errors
+    assert (out / "run.mcap").read_bytes() == b"precious"
+
+
 def test_a_walk_from_a_script_is_that_of_the_command(
     out: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -178,6 +178,26 @@ def test_another_schema_version_and_other_fields_are_refused() -> None:
     assert refusal(body, State).got == "missing=['foot_force'] unknown=['voltage']"
 
 
+def nested(depth: int) -> list[Any]:
+    """A list within a list, so many times."""
+    value: list[Any] = []
+    for _ in range(depth):
+        value = [value]
+    return value
+
+
+LONG = 900_001  # characters or bytes, nearly what a message may be, and no whole float64s
+
+
+@of_every_type
+@pytest.mark.parametrize("wrong", [nested(1000), "\x00" * LONG, b"x" * LONG, {"\x00" * LONG: -1}])
+def test_the_error_about_any_value_is_a_short_line(kind: type[Message], wrong: Any) -> None:
+    for name in ("schema", "x" * LONG, *(item.name for item in fields(kind))):
+        text = str(refusal({**body_of(kind), name: wrong}, kind))
+        assert len(text) < 300
+        assert text.isprintable()
+
+
 def test_text_is_made_fit_for_a_message() -> None:
     for text in ("", "Stürz", "x" * MAX_TEXT):
         assert truncate_text(text) == text

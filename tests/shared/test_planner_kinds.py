@@ -102,3 +102,13 @@ def test_options_are_numbers_that_the_kind_has(
             load(None, {"planner.kind": "tuned", "planner.options": text})
     with pytest.raises(ConfigError, match="options of distributed: it has none"):
         load(None, {"planner.options": "gain=1"})
+
+
+def test_other_code_has_another_origin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    install_kind(tmp_path, monkeypatch, "edited", LOCAL)
+    before = plugin_origin("edited")
+    module = tmp_path / "quadriga_edited_module.py"
+    module.write_text(module.read_text(encoding="utf-8") + "# more\n", encoding="utf-8")
+    after = plugin_origin("edited")
+    assert before != after
+    assert before.rpartition(" ")[0] == after.rpartition(" ")[0] == "quadriga-edited 1.2"

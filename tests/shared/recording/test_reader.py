@@ -191,3 +191,13 @@ def test_a_file_that_is_deleted_while_it_is_written_is_noticed(tmp_path: Path) -
     with pytest.raises(RecordingError, match=r"run\.mcap: got a file that was deleted"):
         writer.flush()
     writer.finish()
+
+
+def test_a_log_time_that_no_table_can_hold_is_read_as_the_latest_that_one_can(
+    tmp_path: Path,
+) -> None:
+    with RecordingWriter(tmp_path / "run.mcap", METADATA) as writer:
+        for log_time in (1, (1 << 63) - 1, 1 << 63, (1 << 64) - 1):
+            writer.write("team/estop", b"", log_time)
+    times = [entry.log_time_ns for entry in Recording(tmp_path / "run.mcap").entries()]
+    assert np.array(times, dtype=np.int64).tolist() == [1] + [(1 << 63) - 1] * 3
