@@ -1,7 +1,7 @@
 """The plants of a team among each other, in real time: who drives time, when one must end.
 
 The plant of all robots has nobody to ask. Where each robot has a plant of its own, that of the
-first robot drives time. Ticks begin by the system clocks, see `plant.pace`, and a plant whose
+first robot drives time. Ticks begin by the system clocks, see `plant.loops`, and a plant whose
 messages are too old is given up.
 """
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import socket
 from itertools import cycle
 from pathlib import Path
 from typing import Final
@@ -10,6 +12,10 @@ import numpy as np
 
 from quadriga.agents.inbox import Inbox, parse_message_id
 from quadriga.agents.planning.interface import Expected
+from quadriga.drive.client import ControlLink
+from quadriga.drive.driver_words import read_driver_word
+from quadriga.drive.gamepad import EVENT_BYTES, Gamepad, take, wish_of
+from quadriga.drive.wish import standing
 from quadriga.plant.commands import CommandBox
 from quadriga.recordings.echo import format_entry
 from quadriga.shared.about import About
@@ -27,7 +33,7 @@ from quadriga.sim_server.world.faults import build_components, parse_faults, wit
 from quadriga.status.gather import StatusFold
 from tests.a1 import standing as standing_state
 from tests.fuzz.damage import damage
-from tests.fuzz.target import Reader, example
+from tests.fuzz.target import Reader, change_json, example
 
 _EVERYTHING: Final = Expected((1 << 40, 0), 1 << 40, 1 << 40, True)
 _LOOK_EVERY: Final = 100  # messages
@@ -102,3 +108,43 @@ def orders(_folder: Path) -> Reader:
         parse_faults(timed, ("r1", "r2"), components)
 
     return Reader(good, read, change)
+
+
+def drivers(_folder: Path) -> Reader:
+    """What drivers say to an operator, from a page or a program, and what a gamepad does."""
+    rest = standing(load())
+    words = (
+        {"kind": "drive", "vx": 0.1, "vy": 0, "wz": -0.2, "height": 0.3, "held": True},
+        {"kind": "estop", "text": "why", "number": 7},
+        {"kind": "news"},
+    )
+
+    def read(content: bytes) -> None:
+        pad = Gamepad()
+        for at in range(0, len(content) - EVENT_BYTES + 1, EVENT_BYTES):
+            pad, _ = take(pad, content[at : at + EVENT_BYTES])
+        wish_of(pad, rest)
+        said = read_driver_word(content)
+        assert said.text == printable_line(said.text)
+
+    return Reader(tuple(json.dumps(word).encode() for word in words), read, change_json)
+
+
+def operator_answers(folder: Path) -> Reader:
+    """What an operator answers a program of its machine."""
+    path = folder / "team-1.sock"
+    news = {"kind": "news", "driver": "page 1", "modes": {"r1": "walk"}, "number": 3}
+    good = (json.dumps(news).encode() + b"\n", b'{"kind": "heard"}\n{"kind": "estop"}\n')
+
+    def read(content: bytes) -> None:
+        path.unlink(missing_ok=True)
+        with socket.socket(socket.AF_UNIX) as server:
+            server.bind(str(path))
+            server.listen()
+            with ControlLink(path) as link:
+                operator, _ = server.accept()
+                with operator:
+                    operator.sendall(content)
+                link.await_stop()
+
+    return Reader(good, read, change_json)

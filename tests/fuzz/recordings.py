@@ -22,6 +22,7 @@ from quadriga.shared.recording.metadata import PROFILE, seal
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.recording.writer import RecordingWriter
 from quadriga.shared.topics import TABLE
+from tests.fuzz.arrays import SMALL
 from tests.fuzz.damage import damage
 from tests.fuzz.target import example
 from tests.shared.recording.test_reader import append_to_chunk
@@ -31,10 +32,7 @@ class Recordings:
     """Recordings, damaged, and such as somebody made with right checksums."""
 
     def __init__(self, folder: Path) -> None:
-        self._path, config = (
-            folder / "run.mcap",
-            load(None, {"team.robots": 1, "planner.kind": "none"}),
-        )
+        self._path, config = folder / "run.mcap", load(None, SMALL)
         self._metadata = build_metadata(config, "")
         self._payloads = [(t.key("team", "r1"), encode(example(t.type))) for t in TABLE]
         good = folder / "good.mcap"

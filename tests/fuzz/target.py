@@ -41,6 +41,7 @@ VALUES: Final = (
     "'r1:r1:r1'",
     "'0:99999999999999'",
 )
+_JSON: Final = (*_ANYWHERE, '{"a":' * 3000, "NaN", "null", "{}", '"\\ud800"', "[[1]]")
 
 Change = Callable[[bytes, np.random.Generator], bytes]
 
@@ -93,6 +94,18 @@ def file_reader(
 def choose(known: Sequence[bytes], random: np.random.Generator) -> bytes:
     """One of them."""
     return known[int(random.integers(len(known)))]
+
+
+def change_json(good: bytes, random: np.random.Generator) -> bytes:
+    """A JSON text with a value that it should not have, or damaged anyhow."""
+    text = good.decode()
+    # What stands between a mark of JSON's and the next: a value, a name, or a part of a text.
+    marks = [at for at, letter in enumerate(text) if letter in ":,[]{}"]
+    if random.random() < 0.5 or len(marks) < 2:
+        return damage(good, random)
+    begin = int(random.integers(len(marks) - 1))
+    value = _JSON[int(random.integers(len(_JSON)))]
+    return (text[: marks[begin] + 1] + value + text[marks[begin + 1] :]).encode()
 
 
 def example(kind: type[Message], tick: int = 5) -> Message:

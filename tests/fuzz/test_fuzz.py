@@ -17,20 +17,26 @@ import numpy as np
 import pytest
 
 from quadriga.shared.errors import ConfigError, QuadrigaError
-from tests.fuzz import configurations, messages, recordings
+from tests.fuzz import arrays, certificates, configurations, messages, recordings
 from tests.fuzz.target import Reader, Target
 
 KINDS: Final[Mapping[str, Callable[[Path], Target]]] = {
     "messages": messages.Messages,
     "answers": messages.answers,
     "orders": messages.orders,
+    "drivers": messages.drivers,
+    "operator-answers": messages.operator_answers,
     "configurations": configurations.Configurations,
     "reference-traces": configurations.reference_traces,
+    "predictors": arrays.predictors,
+    "certificates": certificates.Certificates,
+    "authorities": certificates.authorities,
     "recordings": recordings.Recordings,
 }
 # Inputs of those kinds that most of the time is for, and the share of all inputs that is refused at
 # least: damage that nobody notices shows nothing.
-INPUTS = {"messages": 600, "configurations": 160, "recordings": 40}
+INPUTS = {"messages": 600, "configurations": 160, "predictors": 80, "recordings": 40}
+INPUTS |= {"certificates": 200, "authorities": 200}  # whose keys are others each time
 FEW = 20
 REFUSED = 0.25
 MOST_S: Final = 5.0  # of processor time that an input may take

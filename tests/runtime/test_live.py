@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from quadriga.commands.parser import main
 from quadriga.shared.messages import Command
 from tests.runtime.conftest import BEGUN, FOREVER, Team, build_team, run_command
 from tests.runtime.test_doctor import codes, doctor
@@ -44,3 +45,11 @@ def test_a_second_team_does_not_disturb_the_first(team: Team, tmp_path: Path) ->
 def test_a_doctor_finds_all_well(team: Team) -> None:
     _, report = doctor("--config", team.file)
     assert set().union(*codes(report).values()) == {"ready"}
+
+
+def test_faults_are_refused_where_none_are_permitted(
+    team: Team, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["fault", "r1/imu", "off", "--live", "--config", team.file]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "world.live_faults = true when the walk begins" in line

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from quadriga.shared.errors import ProcessError
-from quadriga.shared.messages import Command, Event, Reference, State, Truth
+from quadriga.shared.messages import Command, Event, Measurement, Reference, State, Truth
 from quadriga.shared.topics import CLOCK
 from quadriga.team.launch import QUADRIGA, Launch, ProcessSpec
 from tests.listening import WAIT
@@ -58,6 +58,14 @@ def test_a_plant_of_another_package_walks(puppets: Make, keys: dict[str, Any]) -
     assert [(e.tick, e.code) for e in events if e.kind == "stop"] == [(1000, "time-over")]
     assert not list(recording.messages(Truth)), "nobody knows it"
     assert not list(recording.entries({CLOCK.name}))
+
+
+@pytest.mark.nightly
+def test_robots_in_worlds_of_their_own_walk(make_team: Make) -> None:
+    team = make_team(recorder__enabled=True, world__duration=2.0, **EACH)
+    recording = team.run(standing=False)
+    for robot in ("r1", "r2"):
+        assert max(m.y[1] for m in recording.messages(Measurement, robot)) > 0.3, "it walks"
 
 
 @pytest.mark.nightly

@@ -39,6 +39,7 @@ from tests.runtime.conftest import DATA, REAL_TIME, SPEED
 pytestmark = pytest.mark.usefixtures("_compiled")
 
 Disturb = Callable[[Launch, str], None]
+SWING = 300  # the tick at which the first feet leave the ground
 
 
 def walked(folder: Path, disturb: Disturb | None = None, **keys: Any) -> Path:
@@ -196,6 +197,15 @@ def test_a_planted_bit_in_a_peer_s_measurement_is_found_in_the_next_plan(
     np.testing.assert_allclose(qp.solve(), qp.x, atol=1e-5)
 
 
+def test_a_changed_key_is_found_at_the_first_tick_it_acts(lockstep: Path, tmp_path: Path) -> None:
+    run = edited(lockstep, tmp_path, config={"controller.swing_height": 0.1})
+    for outcome in replayed(run):
+        first = outcome.verdict.first
+        assert first is not None
+        assert (first.tick, first.name) == (SWING, "command")
+        assert outcome.failed
+
+
 def test_a_change_is_drawn_instead_of_failing(
     lockstep: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -274,6 +284,22 @@ def test_real_time_is_replayed_to_the_byte(tmp_path: Path) -> None:
     assert [outcome.robot for outcome in outcomes] == ["r1", "r2"]
     assert all(outcome.verdict.equal["command"] > 300 for outcome in outcomes)
     assert list(Recording(run).messages(Consumed, "r1")), "it tells what it took in"
+
+
+@pytest.mark.nightly
+@pytest.mark.usefixtures("_realtime")
+def test_what_was_taken_in_in_real_time_cannot_be_guessed(tmp_path: Path) -> None:
+    for attempt in range(5):
+        run = walked(tmp_path / str(attempt), world__mode="realtime", world__duration=0.5)
+        before, lost, after = list(Recording(run).messages(Consumed, "r1"))[:3]
+        path = rewritten(run, run.parent / "lost.mcap", without("team/r1/inputs", lost.tick))
+        (outcome,) = replayed(path, "r1")
+        tick, name = outcome.verdict.missing[0]
+        if tick > before.tick:  # else a busy recorder had lost something before
+            break
+    count = after.number - before.number - 1
+    assert tick == before.tick + 1
+    assert name == f"{count} of inputs of r1 between ticks {before.tick} and {after.tick}"
 
 
 def test_the_plans_of_a_central_planner_are_inputs(tmp_path: Path) -> None:

@@ -5,7 +5,16 @@ from __future__ import annotations
 import pytest
 
 from quadriga.commands.parser import build_parser
-from quadriga.shared.members import ROLES, Role, has_lead, plant_name, team_members
+from quadriga.shared.members import (
+    LAST,
+    RECORDER,
+    ROLES,
+    SIM,
+    Role,
+    has_lead,
+    plant_name,
+    team_members,
+)
 
 ROBOTS = ("r1", "r2")
 
@@ -33,6 +42,11 @@ def test_one_process_drives_time(robots: int, each: bool) -> None:
     names = [f"r{i + 1}" for i in range(robots)]
     team = team_members(names, central=True, recorded=True, plant_each=each)
     assert [m.name for m in team if has_lead([m.name])] == [plant_name("r1" if each else "")]
+
+
+def test_the_plant_comes_first_and_the_recorder_hears_all_others_to_the_end() -> None:
+    assert (ROLES[0].name, LAST) == (SIM, RECORDER)
+    assert len({role.name for role in ROLES}) == len(ROLES)
 
 
 @pytest.mark.parametrize("role", ROLES, ids=lambda role: role.name)

@@ -7,6 +7,7 @@ import pytest
 from quadriga.agents.inbox import Inbox
 from quadriga.shared import members
 from quadriga.shared.config.load import load
+from quadriga.shared.config.timing import max_ages, periods
 from quadriga.shared.errors import MessageError
 from quadriga.shared.messages import Flat, Message
 from quadriga.shared.schema import to_markdown
@@ -39,6 +40,15 @@ def test_a_row_is_plausible_and_its_key_leads_back_to_it(topic: Topic) -> None:
     its_own = {members.AGENT, members.SIM} & {*topic.senders, *topic.receivers}
     assert not topic.per_robot or its_own
     assert f"| `{topic.name}` |" in to_markdown()
+
+
+@rows
+@pytest.mark.parametrize("preset", ["usual", "fast"])
+def test_an_input_may_miss_a_turn_before_it_is_too_old(topic: Topic, preset: str) -> None:
+    config = load(None, {"planner.preset": preset})
+    period, age = periods(config)[topic.name], max_ages(config)[topic.name]
+    assert 0 <= period <= 1000
+    assert age == 0 or age >= 2 * period
 
 
 @pytest.mark.parametrize("kind", ["distributed", "centralised", "none"])

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import pytest
 
-from quadriga.shared.about import about_key
+from quadriga.shared.about import About, about_key
 from quadriga.shared.bus import discovery
 from quadriga.shared.bus.discovery import (
     ProcessInfo,
@@ -24,7 +24,7 @@ from quadriga.shared.bus.discovery import (
     view_of,
 )
 from quadriga.shared.bus.session import HERE, READY, Bus
-from quadriga.shared.codec import encode
+from quadriga.shared.codec import decode, encode
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError
@@ -79,6 +79,13 @@ def make_ready(buses: dict[str, Bus], *names: str) -> None:
 def other_version(config: Config, name: str) -> Callable[[], bytes]:
     newer = encode(replace(describe_process(config, name), version="9.0.0"))
     return lambda: newer
+
+
+def test_an_answer_survives_the_wire_and_is_small() -> None:
+    said = describe_process(load(None, {"team.robots": 10}), "r1", "ab" * 32)
+    payload = encode(said)
+    assert decode(payload, About) == said
+    assert len(payload) < 16_384
 
 
 def test_a_process_says_who_it_is_and_how_far(config: Config, buses: dict[str, Bus]) -> None:

@@ -58,6 +58,14 @@ def test_all_items_come_each_threads_own_in_order_or_are_counted(most: int) -> N
     assert (mailbox.dropped > 0) <= (most < _ALL)
 
 
+def test_one_too_many_drops_the_oldest() -> None:
+    mailbox = Mailbox[int](50)
+    for k in range(60):
+        mailbox.put(k)
+    assert mailbox.drain() == list(range(10, 60))
+    assert mailbox.dropped == 10
+
+
 @pytest.mark.parametrize("timeout", [0.0, 1e-9, 0.05])
 def test_an_item_that_was_taken_without_waiting_leaves_no_false_alarm(timeout: float) -> None:
     mailbox = Mailbox[int](9)

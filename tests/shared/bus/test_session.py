@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import socket
 import subprocess
@@ -9,11 +10,14 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import replace
+from pathlib import Path
+from threading import get_ident, local
 from typing import Any
 
 import pytest
 import zenoh
 
+from quadriga.shared.bus import session
 from quadriga.shared.bus.session import HERE, READY, Bus
 from quadriga.shared.config.sections import BusConfig
 from quadriga.shared.errors import BusError, ConfigError
@@ -106,6 +110,28 @@ def test_what_is_collected_is_apart_from_the_inbox_and_has_the_time_it_arrived(
     times = [at for at, _, _ in arrivals]
     assert [sent, *times, looked] == sorted([sent, *times, looked])
     assert collected() == []
+
+
+def test_the_newest_messages_are_kept_and_the_inbox_has_none(opened: Open) -> None:
+    sim, looker = opened("sim"), opened("view-1")
+    newest = looker.keep_newest("team/r1/state", 4)
+    meet(sim, looker)
+    put, seen = sim.publisher("team/r1/state"), list[bytes]()
+    for k in range(1000):
+        put(b"%d" % k)
+
+    def is_last() -> bool:
+        seen.extend(newest.take(2)[1])
+        return seen[-1:] == [b"999"]
+
+    wait_until(is_last)
+    assert seen == sorted(seen, key=int)
+    for k in range(3):
+        put(b"%d" % k)
+    meet(sim, looker)
+    sleep(0.2)
+    assert newest.take(2) == (3, [b"1", b"2"])
+    assert not looker.drain()
 
 
 def test_what_was_sent_before_closing_arrives(opened: Open) -> None:
@@ -301,3 +327,67 @@ def test_a_stock_client_finds_no_process_of_a_team(endpoint: str) -> None:
     before = found()
     with Bus.open(BusConfig(endpoint=endpoint), "team", "sim"):
         assert not found() - before
+
+
+THREADS = """
+endpoint, who, wanted = sys.argv[1:]
+config = BusConfig(endpoint=endpoint)
+with Bus.route(endpoint, "team") if who == "router" else Bus.open(config, "team", who) as opened:
+    opened.declare(HERE)
+    opened.wait_for(HERE, {"r1"}, 20.0, lambda: False)
+    # Those that receive begin with the first link. Zenoh names a thread rx-0 once it has run.
+    time.sleep(1.0)
+    deadline, found = time.monotonic() + 20.0, -1
+    while found != int(wanted) and time.monotonic() < deadline:
+        time.sleep(0.05)
+        names = [task.read_text() for task in Path("/proc/self/task").glob("*/comm")]
+        found = sum(name.startswith("rx-") for name in names)
+    print(found, os.environ.get("ZENOH_RUNTIME"))
+"""
+
+
+@pytest.mark.parametrize(
+    ("who", "given", "threads"),
+    [("sim", None, 1), ("router", None, 2), ("sim", "(rx: (worker_threads: 3))", 3)],
+)
+def test_a_member_receives_in_one_thread_unless_the_user_has_chosen(
+    endpoint: str, who: str, given: str | None, threads: int
+) -> None:
+    environment = {name: text for name, text in os.environ.items() if name != "ZENOH_RUNTIME"}
+    environment |= {} if given is None else {"ZENOH_RUNTIME": given}
+    command = [*PYTHON, IMPORTS + THREADS, endpoint, who, str(threads)]
+    config = BusConfig(endpoint=endpoint, mode="client" if who == "router" else "peer")
+    with (
+        subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process,
+        Bus.open(config, "team", "r1", never) as other,
+    ):
+        other.declare(HERE)
+        said, _ = process.communicate(timeout=60.0)
+    assert said == f"{threads} {given}\n"
+
+
+@pytest.mark.skipif(not Path("/proc").exists(), reason="it looks at threads as Linux does")
+def test_the_thread_that_receives_stays_known_to_python(opened: Open) -> None:
+    """What is local to a thread lives as long as Python's state of it.
+
+    Another test of this process may have had Zenoh begin more than one such thread.
+    """
+    known = local()
+    session._attached.clear()  # this thread may have the number of another test's
+
+    def count() -> bytes:
+        known.calls = getattr(known, "calls", 0) + 1
+        return b"%d %d" % (get_ident(), known.calls)
+
+    sim, r1 = opened("sim"), opened("r1")
+    sim.answer("team/calls", count)
+    meet(sim, r1)
+    told: dict[bytes, list[int]] = {}
+    for _ in range(20):
+        answers = r1.ask("team/calls", 20.0)
+        wait_until(lambda: answers.over)  # noqa: B023
+        for _, _, payload in answers.came:
+            thread, _, calls = payload.partition(b" ")
+            told.setdefault(thread, []).append(int(calls))
+    assert len(told) <= 4
+    assert all(calls == [*range(1, len(calls) + 1)] for calls in told.values())
