@@ -13,9 +13,13 @@ from typing import Any, Final
 
 import numpy as np
 
+from quadriga.agents.predictor.episode import Episode, check_episodes, team_layout
 from quadriga.agents.predictor.gates import GateReport, Provenance, read
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.agents.predictor.store import predictor_sha256, save
+from quadriga.identification.dataset import Dataset, read_data, write_data
+from quadriga.replay import saved_qp
+from quadriga.replay.saved_qp import SavedQp
 from quadriga.shared.config.load import load
 from tests.fuzz.damage import damage
 from tests.fuzz.target import change_json
@@ -119,3 +123,27 @@ def predictors(folder: Path) -> Archives:
         arrays["document"] = np.array(json.dumps(document))
 
     return Archives(folder / "predictor.npz", write, read, sign)
+
+
+def datasets(folder: Path) -> Archives:
+    """Collected data."""
+    random = np.random.default_rng(0)
+    u, y = random.normal(size=(60, 1, 12)), random.normal(size=(60, 1, 6))
+    episode = Episode(u, 0.0 * u, y, 0.0 * y, 10)
+    whole = Dataset((episode, episode), (episode,), (1, 2))
+
+    def read_all(path: Path) -> None:
+        check_episodes(read_data(path).training, team_layout(1, 4, 8))
+
+    return Archives(folder / "data.npz", lambda path: write_data(path, whole), read_all)
+
+
+def saved_programs(folder: Path) -> Archives:
+    """Quadratic programs of single steps."""
+    one: Any = np.eye(3)
+    saved = SavedQp(one, one[0], one, -np.ones(6), np.ones(6), one[0], "plan of r1")
+    return Archives(
+        folder / "qp.npz",
+        lambda path: saved_qp.save(path, saved),
+        lambda path: saved_qp.load(path).solve(),
+    )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from types import SimpleNamespace
@@ -10,6 +11,7 @@ from typing import Any, Final, cast
 
 import numpy as np
 
+from quadriga.experiments.published.experiment_file import read_experiment
 from quadriga.shared.config.load import load
 from quadriga.shared.config.reference_trace import ROW_END, inline_trace, trace_of
 from quadriga.shared.config.write import to_toml
@@ -17,7 +19,7 @@ from quadriga.shared.errors import QuadrigaError
 from quadriga.shared.recording.config import recorded_config
 from quadriga.shared.recording.reader import Recording
 from tests.fuzz.damage import damage
-from tests.fuzz.target import VALUES, Reader, file_reader
+from tests.fuzz.target import VALUES, Reader, change_toml, file_reader
 
 _DEPLOY: Final = Path(__file__).parents[2] / "deploy"
 
@@ -54,6 +56,17 @@ class Configurations:
             recorded: Any = SimpleNamespace(path=self._path, metadata={"config_json": text})
             recorded_config(cast(Recording, recorded))
         to_toml(load(self._path))
+
+
+def toml_files(path: Path, good: list[Path], reads: Callable[[Path], object]) -> Reader:
+    """Files that say what is walked."""
+    return file_reader(path, [file.read_bytes() for file in good], reads, change_toml)
+
+
+def experiments(folder: Path) -> Reader:
+    """Files of experiments."""
+    good = sorted((_DEPLOY / "experiments").glob("*.toml"))
+    return toml_files(folder / "mine.toml", good, read_experiment)
 
 
 def reference_traces(folder: Path) -> Reader:

@@ -108,6 +108,29 @@ def change_json(good: bytes, random: np.random.Generator) -> bytes:
     return (text[: marks[begin] + 1] + value + text[marks[begin + 1] :]).encode()
 
 
+def change_toml(good: bytes, random: np.random.Generator) -> bytes:
+    """A TOML text some of whose lines are missing, or have a value that is none."""
+    changed = _toml_lines(good.decode())
+    for at in random.integers(len(changed), size=int(random.integers(4))):
+        name, equals, _ = changed[int(at)].partition(" = ")
+        value = VALUES[int(random.integers(len(VALUES)))]
+        changed[int(at)] = f"{name} = {value}" if equals and random.random() < 0.7 else ""
+    text = "\n".join(changed).encode()
+    return text if random.random() < 0.7 else damage(text, random)
+
+
+def _toml_lines(text: str) -> list[str]:
+    """The lines of a TOML text; a value of several lines is one."""
+    lines = list[str]()
+    for line in text.splitlines():
+        begins = line.startswith(("[", "#")) or (" = " in line and not line.startswith(" "))
+        if begins or not lines or not line:
+            lines.append(line)
+        else:
+            lines[-1] += "\n" + line
+    return lines
+
+
 def example(kind: type[Message], tick: int = 5) -> Message:
     """A message of a type, with some content."""
     plain = {bool: True, int: 5, float: 0.1, str: "walk", list: ("r1",), dict: {"r1": 1}}

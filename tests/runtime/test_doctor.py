@@ -27,10 +27,13 @@ from quadriga.shared.bus.session import HERE, READY, Bus
 from quadriga.shared.codec import decode, encode
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
+from quadriga.shared.config.write import to_toml
+from quadriga.shared.errors import ProcessError
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.team.endpoint import free_endpoint
-from quadriga.team.launch import QUADRIGA
+from quadriga.team.launch import QUADRIGA, Launch
 from tests.listening import WAIT, await_true
+from tests.runtime.conftest import BEGUN, Make, Watcher
 
 WAITS = """
 import sys
@@ -128,6 +131,46 @@ def test_each_process_is_told_with_what_is_wrong_with_it(
     )
     assert abs(process["clock_offset_s"]) <= process["clock_offset_error_s"]
     assert took < 20.0, "a frozen process holds up nobody"
+
+
+def test_a_team_that_waits_for_one_and_a_doctor_that_is_none_of_it(
+    make_team: Make, watcher: Watcher
+) -> None:
+    team = make_team()
+    rows = tuple(row for row in team.rows(standing=True) if row.name != "r2")
+    with Launch(rows, team.folder / "logs") as running:
+        assert watcher(team).wait_for(HERE, {"sim", "r1", "operator"}, WAIT, lambda: False)
+        status, report = doctor("--config", team.file)
+        assert running.alive == {"sim", "r1", "operator"}
+    assert status == 1
+    assert codes(report) == {
+        "sim": ["here"],
+        "r1": ["here"],
+        "r2": ["not-started"],
+        "operator": ["here"],
+    }
+    texts = {m["name"]: m["diagnoses"][0]["text"] for m in report["members"]}
+    assert texts["r1"] == "here, waits for r2"
+
+
+def test_a_process_with_another_configuration_does_not_walk(make_team: Make) -> None:
+    """It alone leaves, with an error that names the key."""
+    team = make_team()
+    file = team.folder / "other.toml"
+    rows = {row.name: row for row in team.rows(standing=True)}
+    other = replace(team.config, controller=replace(team.config.controller, mu=0.31))
+    file.write_text(to_toml(other), encoding="utf-8")
+    command = (*QUADRIGA, "operate", "--config", str(file))
+    rows["operator"] = replace(rows["operator"], command=command)
+    with (
+        Launch(tuple(rows.values()), team.folder / "logs") as running,
+        pytest.raises(ProcessError) as caught,
+    ):
+        running.watch(lambda: False)
+    mu = f"controller.mu={team.config.controller.mu}"
+    assert "process operator: got exit status 2" in str(caught.value)
+    assert f"configuration: controller.mu=0.31, sim has {mu}," in str(caught.value)
+    assert BEGUN not in team.log("sim")
 
 
 def test_nobody_at_all(config: Config) -> None:

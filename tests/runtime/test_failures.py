@@ -14,12 +14,12 @@ from quadriga.commands.parser import main
 from quadriga.recordings.check import check
 from quadriga.recordings.summary import summarise, summary_of
 from quadriga.recordings.traces import read_traces
-from quadriga.shared.codec import encode
+from quadriga.shared.codec import decode, encode
 from quadriga.shared.codes import LEAD_GONE, LINK_LOST
 from quadriga.shared.errors import ProcessError
-from quadriga.shared.messages import Event
+from quadriga.shared.messages import Event, Status
 from quadriga.shared.recording.metadata import END
-from quadriga.shared.runtime.clock import sleep
+from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.topics import CLOCK, COMMAND, EVENT, TRUTH
 from quadriga.team import launch
 from quadriga.team.launch import Launch
@@ -58,6 +58,36 @@ def test_a_frozen_robot_is_named_and_the_walk_ends(make_team: Make, mode: str) -
             running.watch(never)
     (end,) = [line for line in team.log("sim").splitlines() if "command-lost" in line]
     assert "command-lost  r2 silent for" in end
+
+
+@pytest.mark.nightly
+def test_in_real_time_the_world_waits_for_no_frozen_listener(
+    make_team: Make, watcher: Watcher
+) -> None:
+    """Its buffers are full some seconds after it froze, and what must not be lost waits 5 s."""
+    pushes = ",".join(f"r1:5:90:{second}:0.1" for second in range(1, 120))
+    team = make_team(world__mode="realtime", world__duration=FOREVER, world__push=pushes)
+    echo = (*launch.QUADRIGA, "echo", "**", "--config", team.file)
+    with team.launch() as running, subprocess.Popen(echo, stdout=subprocess.PIPE) as listener:
+        try:
+            assert listener.stdout is not None
+            listener.stdout.readline()
+            bus = watcher(team)
+            await_tick(bus, 10)
+            listener.send_signal(signal.SIGSTOP)
+            received, longest, last = 0, 0.0, monotonic()
+            while received < 5:  # one push a second
+                packet = bus.get(WAIT)
+                assert packet is not None
+                longest, last = max(longest, monotonic() - last), monotonic()
+                if packet[0] == EVENT.key("team"):
+                    event = decode(packet[1], Event)
+                    assert event.kind != "stop", event.detail
+                    received += event.kind == "push"
+        finally:
+            listener.kill()
+        running.watch(lambda: True)
+    assert longest < 2.0
 
 
 @pytest.mark.parametrize("name", ["sim", "r2", "operator"])
@@ -174,6 +204,25 @@ def test_a_stopped_agent_leaves_cleanly_and_the_walk_stops(
     said = team.log("r1").splitlines()
     assert said[-1] == "quadriga: r1: the team walks"
     assert all(line.startswith("quadriga: r1") for line in said)
+
+
+@pytest.mark.usefixtures("_compiled")
+def test_an_emergency_stop_damps_every_robot(make_team: Make, watcher: Watcher) -> None:
+    team = make_team(world__duration=FOREVER)
+    modes: dict[str, str] = {}
+
+    def all_stopped(key: str, payload: bytes) -> bool:
+        if key.endswith("/status") and (status := decode(payload, Status)).mode == "estop":
+            modes[key] = status.reason
+        return len(modes) == 2
+
+    with team.launch(standing=False) as running:
+        team.await_log("sim", BEGUN)
+        bus = watcher(team)
+        assert run_command("estop", "--reason", "smoke", "--config", team.file) == (0, "")
+        await_packet(bus, all_stopped)
+        assert modes == {f"team/{robot}/status": "estop:smoke" for robot in ("r1", "r2")}
+        running.watch(lambda: True)
 
 
 @IN_BOTH_MODES

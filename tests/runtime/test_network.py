@@ -20,6 +20,7 @@ from quadriga.faults.network.link import LinkFaults
 from quadriga.faults.network.order import RadioOrder
 from quadriga.faults.trial import draw_fault
 from quadriga.shared.config.load import load
+from quadriga.shared.errors import ProcessError
 from quadriga.shared.members import OPERATOR
 from quadriga.team.launch import Launch, process_table
 from tests.listening import await_true
@@ -111,6 +112,14 @@ def test_a_faulty_radio_and_a_cable_that_does_not_care(network: EmulatedNetwork)
         assert set(ping(network.enter(TEAM), r2, 3, 0.1)) == {-1.0}
 
 
+def test_a_second_network_of_the_same_number_is_refused_with_the_reason(
+    network: EmulatedNetwork, tmp_path: Path
+) -> None:
+    with pytest.raises(ProcessError, match="emulated network: got"):
+        EmulatedNetwork(network.layout, 1, tmp_path / "second.log")
+    assert min(ping(network.enter("r1"), network.layout.address("r2"))) > 0.0
+
+
 @pytest.mark.parametrize("name", ["link-partition", "radio-partition"])
 def test_a_partition_cuts_off_the_agent_that_the_seed_draws(name: str, tmp_path: Path) -> None:
     config = load(None, {"team.robots": 2})
@@ -139,3 +148,13 @@ def test_nothing_is_left_when_who_made_it_is_killed(tmp_path: Path) -> None:
         assert set(devices_of(layout)) == {layout.air(TEAM), layout.cable("r1")}
         made.send_signal(signal.SIGKILL)
     await_true(lambda: not devices_of(layout) and not Path(f"/proc/{air}").exists())
+
+
+def test_nothing_is_left_when_the_air_is_killed(tmp_path: Path) -> None:
+    layout = NetworkLayout((os.getpid() + 2) % 512, ("r1",), wired=True)
+    with EmulatedNetwork(layout, 1, tmp_path / "log") as network:
+        network._air.kill()
+        network._air.wait()
+        await_true(lambda: not devices_of(layout))
+        with pytest.raises(ProcessError, match="the emulated network"):
+            network.order(RadioOrder("r1", LinkFaults()))
