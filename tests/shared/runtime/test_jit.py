@@ -87,6 +87,27 @@ def test_so_it_is_in_a_folder_that_the_user_names(package: Path, tmp_path: Path)
     assert not list((package / "quadriga/shared/__pycache__").glob("compiled-*"))
 
 
+def test_what_is_empty_or_damaged_is_compiled_anew(package: Path) -> None:
+    assert run(package) == (2.5, 0)
+    kept = package / "quadriga/shared/__pycache__"
+    for pattern, length, hits in (("*.nbc", -9, 0), ("*.nbi", 0, 0), ("none", 0, 1)):
+        for file in kept.rglob(pattern):
+            code = file.read_bytes()
+            file.write_bytes(code[:length] and code[:length] + bytes(-length))
+        assert run(package) == (2.5, hits), pattern
+
+
+def test_on_a_full_disk_only_what_is_complete_is_used(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(free=4096))
+    assert jit_cache.compiled_folder.__wrapped__() is None
+    (folder,) = tmp_path.glob("compiled-*")
+    (folder / jit_cache.REHEARSED).touch()
+    assert jit_cache.compiled_folder.__wrapped__() == folder
+
+
 def test_the_sources_are_those_with_compiled_functions_and_what_they_import() -> None:
     root = places.SOURCE
     found = {str(path.relative_to(root)) for path in jit_cache.sources(root)}
