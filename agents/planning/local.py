@@ -11,10 +11,11 @@ from quadriga.agents.planner.cooperation import brings_forward, coupled_peers
 from quadriga.agents.planner.peers import Neighbours, PeerMemory, Peers, PeerTerms
 from quadriga.agents.planner.planner import Planner, PlannerInputs, PlannerState
 from quadriga.agents.planner.solver import SOLVED, SolvedQp
-from quadriga.agents.planning.active_plan import FADED, ActivePlan, trust_scaling
+from quadriga.agents.planning.active_plan import FADED, trust_scaling
 from quadriga.agents.planning.interface import (
     NOTHING,
     REFUSED,
+    ActivePlan,
     Expected,
     PlanningInputs,
     PlanningOutputs,

@@ -8,6 +8,13 @@ from typing import Any
 import numpy as np
 
 from quadriga.agents.agent import Agent, AgentState, Inputs, Outputs
+from quadriga.agents.planning.active_plan import PlanCheck, Setpoint, setpoint_at
+from quadriga.agents.planning.interface import (
+    ActivePlan,
+    PlanningInputs,
+    PlanningInterface,
+    PlanningOutputs,
+)
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.codec import decode, encode
@@ -85,6 +92,22 @@ def record(rollout: Rollout, ticks: int) -> dict[str, list[Step]]:
     for _ in rollout.ticks(ticks):
         pass
     return {name: listener.steps for name, listener in listeners.items()}
+
+
+class Planned:
+    """An agent's planning with the plans that are in force, as its agent has them."""
+
+    def __init__(self, config: Config, index: int, planning: PlanningInterface[Any]) -> None:
+        self.planning, self._check = planning, PlanCheck(config, index)
+        self.state, self.plans = planning.initial(), tuple[ActivePlan, ...]()
+
+    def step(self, inputs: PlanningInputs) -> PlanningOutputs:
+        self.state, outputs = self.planning.step(self.state, inputs)
+        outputs, self.plans = self._check.admit(outputs, inputs, self.plans)
+        return outputs
+
+    def applied(self, tick: int) -> Setpoint:
+        return setpoint_at(self.plans, tick)
 
 
 def fingerprint(value: Any) -> Any:

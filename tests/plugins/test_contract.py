@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 from quadriga.agents.gait import first_step, horizon_stance, nominal_forces, step_ms
-from quadriga.agents.planning.active_plan import ActivePlan, setpoint_at
+from quadriga.agents.planning.active_plan import PlanCheck, setpoint_at
 from quadriga.agents.planning.interface import (
+    ActivePlan,
     Expected,
     PlanningInputs,
     PlanningInterface,
@@ -158,8 +159,11 @@ def test_plans_and_setpoints_are_finite(name: str, robot: int) -> None:
         assert np.isfinite(plan.y).all()
         assert plan.tick == plan.step * step_ms(config)
     assert [plan.serial for plan in plans] == sorted({plan.serial for plan in plans})
+    check, active = PlanCheck(config, robot), tuple[ActivePlan, ...]()
     for call in walk(name)[robot]:
-        setpoint = setpoint_at(call.after.plans, call.inputs.tick)
+        outputs, active = check.admit(call.outputs, call.inputs, active)
+        assert outputs is call.outputs, "none of its plans is refused"
+        setpoint = setpoint_at(active, call.inputs.tick)
         assert setpoint.deviation.shape == (12,)
         assert np.isfinite(setpoint.deviation).all()
         assert setpoint.y_ref is None or np.isfinite(setpoint.y_ref).all()
