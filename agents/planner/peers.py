@@ -98,13 +98,11 @@ class PeerTerms:
         effect: Σ G_ij [u_ini; y_ini; u] over the peers, (6 N,).
         slope: Σ M_ij [u_ini; y_ini; u] over the peers, what they add to the slope of the team's
             cost by own stance forces, (nv,); 0 where each agent has its own cost.
-        step: planning step.
         peers: what this is made of.
     """
 
     effect: Array | float = 0.0
     slope: Array | float = 0.0
-    step: int = 0
     peers: tuple[PeerData, ...] = ()
 
     @property
@@ -384,7 +382,7 @@ class Peers:
         total = (rows @ z.ravel()[columns]).astype(np.float64)
         outputs = N_OUTPUTS * self._config.planner.N
         slope = total[outputs:] if self._cooperative else 0.0
-        return PeerTerms(total[:outputs], slope, step, peers)
+        return PeerTerms(total[:outputs], slope, peers)
 
     def _coupling(
         self, step: int, window_step: int
