@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
 from typing import Final, TypeVar
 
 import numpy as np
@@ -346,8 +347,7 @@ class Peers:
     def __init__(self, config: Config, index: int, predictor: Predictor) -> None:
         self._config, self._index, self._predictor = config, index, predictor
         self._others = [j for j in range(config.team.robots) if j != index]
-        # Memo of the couplings, one for each step of the gait's cycle; it changes no result.
-        self._couplings: dict[tuple[int, int], tuple[NDArray[np.int64], NDArray[np.float32]]] = {}
+        self._coupling = cache(self._build_coupling)  # of two steps of the gait's cycle
         self._cycle = walking_steps(config)
         self._cooperative = is_cooperative(config)
         behind = {0 if brings_forward(config) else 1}
@@ -356,7 +356,7 @@ class Peers:
         # The cycle's first step is set up twice: later its plans also begin at a step of the walk.
         for step in (*self._cycle, self._cycle.stop):
             for steps in behind:
-                self._coupling(step, step - steps)
+                self._coupling(*self._places(step, step - steps))
 
     def terms(
         self, peers: tuple[PeerData, ...], step: int, window_step: int, y_base: Array
@@ -378,21 +378,21 @@ class Peers:
                 z[peer.index - (peer.index > self._index)] = np.concatenate(
                     [peer.du_ini.ravel(), dy.ravel(), peer.du.ravel()]
                 )
-        columns, rows = self._coupling(step, window_step)
+        columns, rows = self._coupling(*self._places(step, window_step))
         total = (rows @ z.ravel()[columns]).astype(np.float64)
         outputs = N_OUTPUTS * self._config.planner.N
         slope = total[outputs:] if self._cooperative else 0.0
         return PeerTerms(total[:outputs], slope, peers)
 
-    def _coupling(
+    def _places(self, *steps: int) -> tuple[int, ...]:
+        return tuple(place_in(self._cycle, step) for step in steps)
+
+    def _build_coupling(
         self, step: int, window_step: int
     ) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
         """Of all peers' z at a step, whose plans begin at `window_step`: places, and rows of G."""
-        place = place_in(self._cycle, step), place_in(self._cycle, window_step)
-        if place not in self._couplings:
-            stance = [horizon_stance(self._config, j, window_step) for j in self._others]
-            self._couplings[place] = couple(self._blocks(step), stance)
-        return self._couplings[place]
+        stance = [horizon_stance(self._config, j, window_step) for j in self._others]
+        return couple(self._blocks(step), stance)
 
     def _blocks(self, step: int) -> list[Array]:
         """G_ij of each peer; with the team's cost [G_ij; M_ij]."""
