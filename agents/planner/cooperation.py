@@ -37,7 +37,6 @@ from functools import lru_cache
 from typing import Final
 
 import numpy as np
-from scipy import linalg
 from scipy.sparse.linalg import eigsh
 
 from quadriga.agents.gait import distinct_steps, horizon_stance, phase_of
@@ -109,7 +108,7 @@ def build_team_problem(
     The last sum comes from the peers (`peer_slope`). The predicted outputs are the agent's own.
     """
     phase, stance = phase_of(config, step, predictor.phases), horizon_stance(config, index, step)
-    past, columns = predictor.meta.past, stance_columns(stance)
+    past, columns = predictor.layout.past, stance_columns(stance)
     slopes = team_slope(config, predictor, index, step)
     F_past = np.zeros((len(columns), past))
     H = np.diag(np.tile(config.planner.R, len(columns) // 3))
@@ -133,7 +132,7 @@ def peer_slope(slopes: Array, predictor: Predictor, peer: int, phase: int) -> Ar
 
     `slopes` are the `team_slope` of agent i.
     """
-    M = np.zeros((slopes.shape[1], predictor.meta.width))
+    M = np.zeros((slopes.shape[1], predictor.layout.width))
     for j, slope in enumerate(slopes):
         M += slope @ predictor.block(j, peer, phase)
     return M
@@ -153,22 +152,13 @@ def team_hessian(config: Config, predictor: Predictor, step: int) -> tuple[Array
 def eigenvalue_range(H: Array, sizes: Sequence[int]) -> tuple[float, float]:
     """Least and largest eigenvalue of D⁻¹H, D being the blocks of these sizes on the diagonal of H.
 
-    They are those of the symmetric L⁻¹ H L⁻ᵀ with D = L Lᵀ. Their mean is 1, which lies between.
+    Their mean is 1, which lies between.
     """
-    whitened, ends = H.copy(), np.cumsum(sizes)
-    for end, size in zip(ends, sizes, strict=True):
-        part = slice(end - size, end)
-        factor = linalg.cholesky(H[part, part], lower=True)
-        whitened[part] = linalg.solve_triangular(factor, whitened[part], lower=True)
-        whitened[:, part] = linalg.solve_triangular(factor, whitened[:, part].T, lower=True).T
-    # A start that is fixed, so that equal data give equal bits.
+    owner = np.repeat(np.arange(len(sizes)), sizes)
+    D = np.where(owner[:, None] == owner, H, 0.0)
+    start = np.ones(len(H))  # which is fixed, so that equal data give equal bits
     least, most = eigsh(
-        0.5 * (whitened + whitened.T),
-        k=2,
-        which="BE",
-        v0=np.ones(len(H)),
-        tol=_TOLERANCE,
-        return_eigenvectors=False,
+        H, k=2, M=D, which="BE", v0=start, tol=_TOLERANCE, return_eigenvectors=False
     )
     return float(least), float(most)
 
@@ -222,7 +212,7 @@ def _eigenvalue_ranges(config: Config, predictor: Predictor) -> tuple[tuple[floa
 
 
 def kept_share(config: Config) -> float:
-    """d, the share of its own last plan that an agent's best response keeps.
+    """d, the share of its own last plan that a best response keeps; chosen, 0 if it answers nobody.
 
     By the size of the team: where n robots act on each other alike, with effects c of their own,
     the undamped map has the eigenvalues c and −c (n − 1). Keeping d, the largest in size is least
@@ -235,10 +225,5 @@ def kept_share(config: Config) -> float:
     if planner.damping != _BY_SIZE:
         return planner.damping
     few = 3 if planner.preset == "usual" else 2
-    return 0.0 if n <= few else (n - 2) / (n + 2)
-
-
-def kept_by_agent(config: Config) -> float:
-    """`kept_share`, but for agents that answer nobody, whatever the size of the team."""
-    answers, by_size = find_kind(config.planner.kind).needs_peers, config.planner.damping < 0.0
-    return 0.0 if by_size and not answers else kept_share(config)
+    answers = find_kind(planner.kind).needs_peers
+    return (n - 2) / (n + 2) if answers and n > few else 0.0

@@ -371,7 +371,7 @@ class Peers:
         """
         if not peers:
             return PeerTerms()
-        z = np.zeros((len(self._others), self._predictor.meta.width), dtype=np.float32)
+        z = np.zeros((len(self._others), self._predictor.layout.width), dtype=np.float32)
         for peer in peers:
             if peer.status == USABLE:
                 dy = np.where(peer.known[:, None], peer.y_ini - y_base, 0.0)

@@ -19,7 +19,7 @@ from quadriga.agents.gait import (
 from quadriga.agents.planner.cooperation import (
     build_team_problem,
     is_cooperative,
-    kept_by_agent,
+    kept_share,
     new_plan_share,
     stay_near_last,
 )
@@ -158,7 +158,7 @@ class Planner:
         self._config, self._index, self._predictor = config, index, predictor
         self._cycle = walking_steps(config)
         self._cooperative = is_cooperative(config)
-        self._kept = 0.0 if self._cooperative else kept_by_agent(config)
+        self._kept = 0.0 if self._cooperative else kept_share(config)
         self._new_share = new_plan_share(config, predictor) if self._cooperative else 1.0
         self._setup = cache(self._build_setup)  # of a step of the gait's cycle
         for step in self._cycle:
@@ -258,7 +258,7 @@ class Planner:
         return innovation
 
     def _build_setup(self, step: int) -> _Setup:
-        config, index, past = self._config, self._index, self._predictor.meta.past
+        config, index, past = self._config, self._index, self._predictor.layout.past
         stance, weight = horizon_stance(config, index, step), config.robot.weight
         if self._cooperative:
             problem = build_team_problem(config, self._predictor, index, step)

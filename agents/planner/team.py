@@ -123,7 +123,7 @@ def build_centralised(
         PredictorError: the predictor's sizes are not the configuration's.
     """
     check_sizes(config, predictor)
-    past = predictor.meta.past
+    past = predictor.layout.past
 
     def formulation(phase: int, stance: NDArray[np.bool_]) -> Condensed:
         robots = range(config.team.robots)

@@ -492,7 +492,7 @@ def fit_free(walks: Sequence[_Walk], h: Array, layout: Layout) -> Array:
                 candidates.append((columns, penalty))
         best = np.zeros(p, dtype=np.int64)
         if len(sums) == 2:
-            best = _choose_penalties(*sums, i, candidates)
+            best = _choose_penalties(sums[0], sums[1], i, candidates)
         for k in np.unique(best).tolist():
             solution = _solve_free(_total(sums), i, *candidates[k])
             for output in np.flatnonzero(best == k).tolist():

@@ -129,16 +129,6 @@ class PredictorMeta:
             return Period(self.phases)
         return Period(2 * self.stance_ms, self.stand_ms, SAMPLE_MS)
 
-    @property
-    def width(self) -> int:
-        """Columns of a block: length of one agent's [u_ini; y_ini; u]."""
-        return self.layout.width
-
-    @property
-    def past(self) -> int:
-        """Columns of a block that belong to [u_ini; y_ini]."""
-        return self.layout.past
-
 
 def as_tuples(value: Any) -> Any:
     """A value of JSON with tuples for its lists, however deep they are."""

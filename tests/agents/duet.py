@@ -35,13 +35,13 @@ def simple_predictor(config: Config) -> Predictor:
         effect[1, 3 * leg] = effect[2, 3 * leg + 1] = 8e-4  # m/s per N and sample
     forget = np.exp(-0.2)
     fading = np.array([[forget ** (k - j) if k >= j else 0.0 for j in range(N)] for k in range(N)])
-    G = np.zeros((meta.robots, meta.robots, N_OUTPUTS * N, meta.width))
-    last = meta.past - N_OUTPUTS  # column of the newest output in [u_ini; y_ini]
+    G = np.zeros((meta.robots, meta.robots, N_OUTPUTS * N, meta.layout.width))
+    last = meta.layout.past - N_OUTPUTS  # column of the newest output in [u_ini; y_ini]
     assert last == N_FORCES * T_ini + N_OUTPUTS * (T_ini - 1)
     for robot in range(meta.robots):
         fade = forget ** np.arange(1.0, N + 1.0)
-        G[robot, robot, :, last : meta.past] = np.kron(fade[:, None], np.eye(N_OUTPUTS))
-        G[robot, robot, :, meta.past :] = np.kron(fading, effect)
+        G[robot, robot, :, last : meta.layout.past] = np.kron(fade[:, None], np.eye(N_OUTPUTS))
+        G[robot, robot, :, meta.layout.past :] = np.kron(fading, effect)
     return Predictor(meta, G[None])
 
 

@@ -18,7 +18,6 @@ from quadriga.agents.planner.cooperation import (
     coupled_peers,
     eigenvalue_range,
     is_cooperative,
-    kept_by_agent,
     kept_share,
     new_plan_share,
 )
@@ -51,14 +50,14 @@ def coupled(config: Config, seed: int, strength: float) -> Predictor:
     """
     meta = PredictorMeta.of(config)
     rng, n = np.random.default_rng(seed), meta.robots
-    shape = (meta.N, 6, meta.width)
+    shape = (meta.N, 6, meta.layout.width)
     size = 1e-4 * np.array([1.0, 30.0, 30.0, 10.0, 10.0, 30.0])[:, None]
     own = [rng.normal(size=shape) * size for _ in range(n)]
-    G = np.empty((1, n, n, 6 * meta.N, meta.width))
+    G = np.empty((1, n, n, 6 * meta.N, meta.layout.width))
     for i in range(n):
         for j in range(n):
             mixed = own[j] if i == j else strength * (own[j] + 0.3 * rng.normal(size=shape) * size)
-            G[0, i, j] = mixed.reshape(6 * meta.N, meta.width)
+            G[0, i, j] = mixed.reshape(6 * meta.N, meta.layout.width)
     return Predictor(meta, G)
 
 
@@ -265,7 +264,7 @@ def test_too_little_of_the_last_plan_is_refused(small: Config, linear_team: Team
     alike = exact.G.copy()
     for i in range(3):
         for j in range(3):
-            alike[0, i, j, :, meta.past :] = exact.G[0, j, j, :, meta.past :]
+            alike[0, i, j, :, meta.layout.past :] = exact.G[0, j, j, :, meta.layout.past :]
     wild = Predictor(exact.meta, alike)
     assert cooperative_radius(plant, wild) > 1.0
     report = replace(
@@ -317,8 +316,8 @@ def test_the_peers_terms_are_the_effect_of_their_plans_and_its_slope(
     pushing = np.where(stance, np.tile([20.0, 5.0, 0.0], (8, 4)), 0.0)
     pair = peer(config, age=1, du=pushing), peer(config, robot="r3", index=2)
     terms = Peers(config, 0, predictor).terms(pair, STEP, STEP, base)
-    z = np.zeros((3, predictor.meta.width))
-    z[1, predictor.meta.past :] = pushing.ravel()
+    z = np.zeros((3, predictor.layout.width))
+    z[1, predictor.layout.past :] = pushing.ravel()
     effect = predictor.predict(z)
     qp = planner.problem_of(PlannerState(), inputs_of(config), terms)
     assert qp is not None
@@ -364,6 +363,6 @@ def test_few_robots_are_damped_only_if_they_are_asked_to_be() -> None:
 def test_who_answers_nobody_is_damped_only_if_it_is_asked_to() -> None:
     kinds = ("distributed", "decentralised")
     teams = [load(overrides={"team.robots": 5, "planner.kind": kind}) for kind in kinds]
-    assert [kept_by_agent(team) for team in teams] == [pytest.approx(3 / 7), 0.0]
+    assert [kept_share(team) for team in teams] == [pytest.approx(3 / 7), 0.0]
     asked = load(overrides={"planner.kind": "decentralised", "planner.damping": 0.4})
-    assert kept_by_agent(asked) == 0.4
+    assert kept_share(asked) == 0.4

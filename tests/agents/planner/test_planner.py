@@ -75,7 +75,7 @@ def test_the_qp_is_that_of_eq_12_written_out(
     solved = planner.problem_of(PlannerState(), inputs, terms)
     assert solved is not None
     _, result = planner.step(PlannerState(), inputs, terms)
-    G, past = predictor.block(0, 0), predictor.meta.past
+    G, past = predictor.block(0, 0), predictor.layout.past
     y_free = G[:, :past] @ inputs.past() + terms.effect
     error = y_free - (inputs.y_des - inputs.y_base).ravel()
     weighted = G[:, past:][:, solved.problem.columns].T * np.tile(small.planner.Q, 8)

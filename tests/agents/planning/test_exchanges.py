@@ -25,7 +25,7 @@ def coupled(config: Config, strength: float = 0.3) -> Predictor:
     """What a robot does to itself it does to its peer as well, more weakly."""
     alone = simple_predictor(config)
     G = alone.G.copy()
-    past = alone.meta.past
+    past = alone.layout.past
     for i in range(2):
         G[:, i, 1 - i, :, past:] = strength * G[:, i, i, :, past:]
     return Predictor(alone.meta, G)

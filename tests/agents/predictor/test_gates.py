@@ -57,11 +57,11 @@ def predictor(plant: Config, linear_team: Team) -> Predictor:
 def coupled(config: Config, seed: int, strength: float) -> Predictor:
     """Any G of a plausible size whose blocks off the diagonal are `strength` times as large."""
     meta = PredictorMeta.of(config)
-    shape = (meta.robots, meta.robots, meta.N, 6, meta.width)
+    shape = (meta.robots, meta.robots, meta.N, 6, meta.layout.width)
     G = np.random.default_rng(seed).normal(size=shape)
     G *= 1e-4 * np.array([1.0, 30.0, 30.0, 10.0, 10.0, 30.0])[:, None]
     G *= np.where(np.eye(meta.robots), 1.0, strength)[:, :, None, None, None]
-    return Predictor(meta, G.reshape(1, meta.robots, meta.robots, -1, meta.width))
+    return Predictor(meta, G.reshape(1, meta.robots, meta.robots, -1, meta.layout.width))
 
 
 def of_kind(config: Config, kind: str) -> Config:

@@ -143,10 +143,10 @@ def test_what_cannot_be_fitted_is_refused_by_name(changes: dict[str, Any], text:
         (U[:, 0], Y, r"u: got shape \(100,\)"),
         (U * np.inf, Y, r"u: got NaN, infinity or too large numbers"),
         (U * 1e200, Y, r"u: got NaN, infinity or too large numbers"),
-        (U + 1j, Y, "u: got complex numbers"),
+        (U + 1j, Y, "an array of real numbers"),
         (np.ma.masked_less(U, 0.0), Y, "u: got masked samples"),
-        ([["a"]], Y, "an array of numbers"),
-        ([[10**400]], Y, "an array of numbers"),
+        ([["a"]], Y, "an array of real numbers"),
+        ([[10**400]], Y, "an array of real numbers"),
     ],
 )
 def test_signals_that_do_not_belong_together_are_refused(u: Any, y: Any, text: str) -> None:
