@@ -54,6 +54,23 @@ def inputs_of(config: Config, step: int = STEP, **changes: Any) -> PlannerInputs
     return replace(calm, **changes)
 
 
+def disturbed(config: Config, seed: int, size: float = 1.0) -> list[PlannerInputs]:
+    """All robots of a team off their course in ways of their own."""
+    rng, T_ini, N = np.random.default_rng(seed), config.planner.T_ini, config.planner.N
+    scale = size * np.array([0.004, 0.1, 0.1, 0.02, 0.02, 0.1])
+    stands = nominal_forces(np.ones((T_ini, 4), dtype=np.bool_))
+    y_des = np.tile(BASE + 0.2 * scale * rng.normal(size=6), (N, 1))
+    return [
+        inputs_of(
+            config,
+            u_ini=stands + 5.0 * size * rng.normal(size=(T_ini, 12)),
+            y_ini=BASE + scale * rng.normal(size=(T_ini, 6)),
+            y_des=y_des,
+        )
+        for _ in range(config.team.robots)
+    ]
+
+
 def terms_of(
     config: Config, predictor: Predictor, *peers: PeerData, base: Array | None = None
 ) -> PeerTerms:

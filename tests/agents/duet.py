@@ -45,6 +45,15 @@ def simple_predictor(config: Config) -> Predictor:
     return Predictor(meta, G[None])
 
 
+def coupled(config: Config, strength: float = 0.3) -> Predictor:
+    """What a robot does to itself it does to its peer as well, more weakly."""
+    alone = simple_predictor(config)
+    G, past = alone.G.copy(), alone.layout.past
+    for i in range(2):
+        G[:, i, 1 - i, :, past:] = strength * G[:, i, i, :, past:]
+    return Predictor(alone.meta, G)
+
+
 def asked(vx: float = 0.3) -> Reference:
     return Reference(0, 0, vx, 0.0, 0.0, 0.26)
 

@@ -18,7 +18,7 @@ from quadriga.shared.messages import Measurement, Plan
 from quadriga.shared.modes import STAND, STOPPING, WALK, Mode
 from quadriga.shared.robots.conventions import Array
 from tests.a1 import nominal_forces
-from tests.agents.duet import Planned, asked, simple_predictor
+from tests.agents.duet import Planned, asked, coupled, simple_predictor
 
 ALONE = Config(team=TeamConfig(robots=1), planner=PlannerConfig(latency_ms=0))
 REFERENCE = asked(0.3)
@@ -30,15 +30,6 @@ FIRST = 320
 @cache
 def planning_of(config: Config) -> LocalPlanning:
     return LocalPlanning(config, 0, simple_predictor(config), lambda: 0)
-
-
-@cache
-def coupled(config: Config) -> Predictor:
-    """What a peer does moves the other as well."""
-    alone = simple_predictor(config)
-    G = alone.G.copy()
-    G[:, 0, 1] = 0.3 * G[:, 1, 1]
-    return Predictor(alone.meta, G)
 
 
 class Walker(Planned):
@@ -110,15 +101,6 @@ def test_without_a_whole_window_of_own_samples_nothing_is_planned(missing: int) 
     assert outputs.plan is None
     assert outputs.planner_ns is None
     assert outputs.unusual == ("window_gap",)
-
-
-def test_a_message_from_another_time_is_counted() -> None:
-    pair = replace(ALONE, team=TeamConfig(robots=2))
-    stray = Measurement(10_000, 0, np.zeros(12), ON_COURSE, np.ones(4))
-    planning = planning_of(pair)
-    arrived = PlanningInputs(400, WALKING, (REFERENCE,), measurements=(("r2", stray),))
-    _, outputs = planning.step(planning.initial(), arrived)
-    assert outputs.unusual.count("refused_by_planner") == 1
 
 
 @pytest.mark.parametrize("mode", [Mode(STAND, 0), Mode(STOPPING, 300, "why")])
