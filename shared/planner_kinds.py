@@ -44,14 +44,12 @@ class PlannerKind:
             for the whole team, from the configuration, the predictor or None, and a function that
             reads the collected episodes; "" for all other kinds.
         needs_predictor: whether it plans with a fitted predictor, which then has to pass the gates.
-        needs_peers: whether agents respond to their peers' plans. Then the best-response gate
-            applies, and the check of the delay holds every plan against the peers' plans.
+        needs_peers: whether agents, which plan for themselves, respond to their peers' plans. Then
+            the best-response gate applies, and the check of the delay holds every plan against the
+            peers' plans.
         needs_data: whether it plans with the collected data themselves.
         publishes: whether plans are published; if so they are missed where there are none.
         options: numbers that `planner.options` may set, with their defaults.
-
-    Raises:
-        ValueError: facts that contradict each other.
     """
 
     name: str
@@ -63,10 +61,6 @@ class PlannerKind:
     needs_data: bool = False
     publishes: bool = True
     options: Mapping[str, float] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        if self.central and self.needs_peers:
-            raise ValueError(f"{self.name}: one process plans for all, so no agent needs its peers")
 
     @property
     def central(self) -> bool:

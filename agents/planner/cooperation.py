@@ -37,7 +37,7 @@ from functools import lru_cache
 from typing import Final
 
 import numpy as np
-from scipy.sparse.linalg import eigsh
+from scipy import linalg
 
 from quadriga.agents.gait import distinct_steps, horizon_stance, phase_of
 from quadriga.agents.planner.qp import (
@@ -53,7 +53,6 @@ from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.robots.conventions import N_OUTPUTS, Array
 
 TEAM: Final = "team"  # of planner.cost
-_TOLERANCE: Final = 1e-6  # of the eigenvalues
 _BY_SIZE: Final = -1.0  # value of planner.damping
 
 
@@ -156,11 +155,8 @@ def eigenvalue_range(H: Array, sizes: Sequence[int]) -> tuple[float, float]:
     """
     owner = np.repeat(np.arange(len(sizes)), sizes)
     D = np.where(owner[:, None] == owner, H, 0.0)
-    start = np.ones(len(H))  # which is fixed, so that equal data give equal bits
-    least, most = eigsh(
-        H, k=2, M=D, which="BE", v0=start, tol=_TOLERANCE, return_eigenvectors=False
-    )
-    return float(least), float(most)
+    values = linalg.eigh(H, D, eigvals_only=True)
+    return float(values[0]), float(values[-1])
 
 
 def stay_near_last(

@@ -226,7 +226,7 @@ class Neighbours:
         )
 
     def select(
-        self, memory: PeerMemory, last: int, first_step: int, *, window_step: int | None = None
+        self, memory: PeerMemory, last: int, first_step: int, end: int
     ) -> tuple[PeerData, ...]:
         """Choose the plan and the window of each peer that a planning step uses.
 
@@ -237,11 +237,9 @@ class Neighbours:
             memory: what has been remembered.
             last: newest step whose plans and samples are looked at; with the one-step delay k−1.
             first_step: the first planning step of the team, or since it walks again.
-            window_step: planning step at which the windows end: `last`, as in eq. 11, or a later
-                one, which moves windows and plans forward and takes samples not measured yet from
-                the plans.
+            end: planning step at which the windows end: `last`, as in eq. 11, or a later one, which
+                moves windows and plans forward and takes samples not measured yet from the plans.
         """
-        end = last if window_step is None else window_step
         config, planner, peers = self._config, self._config.planner, []
         for name, index in self._indices.items():
             history = memory.peers[name]

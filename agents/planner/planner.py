@@ -217,7 +217,7 @@ class Planner:
         solution = no_solution(problem, PEER_LOST)
         if not peers.lost:
             solution = setup.solver.solve(f, error)
-            qp = SolvedQp(problem, f, *problem.bounds(error), solution)
+            qp = SolvedQp(problem.shifted(error), f, solution)
         return self._fall_back(setup, inputs, solution, last, y_free), qp
 
     def _fall_back(

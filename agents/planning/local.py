@@ -162,7 +162,7 @@ class LocalPlanning:
     ) -> PeerTerms:
         """Of what peers sent up to the step `last`, with windows that end at the step `end`."""
         first = max(self._first_step, -(-inputs.mode.since // self._step_ms))
-        peers = self._neighbours.select(state.peers, last, first, window_step=end)
+        peers = self._neighbours.select(state.peers, last, first, end)
         # The base of samples to come is the command of `last`, whenever this is computed.
         now = last * self._step_ms
         base = base_of_window(self._config, end * self._step_ms, inputs.references, now)

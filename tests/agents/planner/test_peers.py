@@ -78,7 +78,7 @@ def remember(step: int, plans: list[int], ticks: list[int], robot: str = "r2") -
 
 
 def of(memory: PeerMemory, step: int, robot: str = "r2") -> PeerData:
-    peers = NEIGHBOURS.select(memory, step - 1, FIRST)
+    peers = NEIGHBOURS.select(memory, step - 1, FIRST, step - 1)
     return next(peer for peer in peers if peer.robot == robot)
 
 
@@ -97,7 +97,7 @@ def expected_du(step: int, age: int) -> Array:
 
 def test_the_first_planning_step_needs_nobodys_plan() -> None:
     memory = remember(FIRST, [], window_ticks(FIRST))
-    peers = NEIGHBOURS.select(memory, FIRST - 1, FIRST)
+    peers = NEIGHBOURS.select(memory, FIRST - 1, FIRST, FIRST - 1)
     assert PeerTerms(peers=peers).used == {}
     assert [peer.status for peer in peers] == [USABLE, USABLE]
     assert all((peer.du == 0).all() for peer in peers)
@@ -232,7 +232,7 @@ def test_loss_repetition_and_reordering(
 
 def test_brought_forward_the_window_ends_now_and_its_end_is_what_the_peer_planned() -> None:
     memory = remember(20, [18, 19, 20], list(range(10, 810, 10)))
-    peer = NEIGHBOURS.select(memory, 19, FIRST, window_step=20)[0]
+    peer = NEIGHBOURS.select(memory, 19, FIRST, 20)[0]
     assert (peer.status, peer.step, peer.age) == (USABLE, 19, 0)
     # Samples after the step that may be looked at come from its plan, measured or not.
     expected = [mark("r2", 750), mark("r2", 760), *(told(19, k) for k in range(4))]
@@ -269,6 +269,6 @@ def test_complete_means_every_peer_s_plan_and_the_samples_before_it() -> None:
 
 def test_plans_of_before_a_stop_do_not_count() -> None:
     memory = remember(20, [12, 13], window_ticks(20))
-    peer = NEIGHBOURS.select(memory, 19, 20)[0]
+    peer = NEIGHBOURS.select(memory, 19, 20, 19)[0]
     assert (peer.status, peer.step, peer.age) == (USABLE, None, 0)
     assert not peer.du.any()
