@@ -32,7 +32,6 @@ innovation, the difference δ between its window and the one that its last plan 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import lru_cache
 from typing import Final
 
@@ -71,18 +70,16 @@ def brings_forward(config: Config) -> bool:
 
 
 def coupled_peers(config: Config, index: int, predictor: Predictor) -> frozenset[int]:
-    """Robots whose plans matter to agent `index`: those whose forces move its outputs.
+    """Robots whose plans matter to agent `index`: the members that explain its outputs.
 
-    With the team's cost also those whose forces move an output that its own forces move.
+    With the team's cost also those that explain an output which its own forces move.
     """
     if not find_kind(config.planner.kind).needs_peers:
         return frozenset()
-    robots = range(config.team.robots)
-    if predictor.meta.neighbours == "all":
-        return frozenset(robots) - {index}
-    moves = np.array([[predictor.couples(j, i) for i in robots] for j in robots])
-    moved = moves[:, index] if is_cooperative(config) else np.arange(len(robots)) == index
-    return frozenset(np.flatnonzero(moves[moved].any(axis=0)).tolist()) - {index}
+    members = predictor.layout.members
+    moved = [each for each in members if index in each]
+    matter = moved if is_cooperative(config) else [members[index]]
+    return frozenset().union(*matter) - {index}
 
 
 def team_slope(config: Config, predictor: Predictor, index: int, step: int) -> Array:
@@ -137,26 +134,17 @@ def peer_slope(slopes: Array, predictor: Predictor, peer: int, phase: int) -> Ar
     return M
 
 
-def team_hessian(config: Config, predictor: Predictor, step: int) -> tuple[Array, list[int]]:
-    """Hessian of V by all agents' stance forces, (s, s), and how many of them each agent has."""
+def team_hessian(config: Config, predictor: Predictor, step: int) -> tuple[Array, Array]:
+    """H, the Hessian of V by all agents' stance forces, and D, its block diagonal. (s, s) each."""
     robots, phase = range(config.team.robots), phase_of(config, step, predictor.phases)
     columns = [stance_columns(horizon_stance(config, i, step)) for i in robots]
     G = np.block([[predictor.future_block(i, j, phase)[:, columns[j]] for j in robots]
                   for i in robots])  # fmt: skip
     H = (G.T * np.tile(config.planner.Q, len(G) // N_OUTPUTS)) @ G
     H.flat[:: len(H) + 1] += np.tile(config.planner.R, len(H) // 3)
-    return 0.5 * (H + H.T), [len(places) for places in columns]
-
-
-def eigenvalue_range(H: Array, sizes: Sequence[int]) -> tuple[float, float]:
-    """Least and largest eigenvalue of D⁻¹H, D being the blocks of these sizes on the diagonal of H.
-
-    Their mean is 1, which lies between.
-    """
-    owner = np.repeat(np.arange(len(sizes)), sizes)
-    D = np.where(owner[:, None] == owner, H, 0.0)
-    values = linalg.eigh(H, D, eigvals_only=True)
-    return float(values[0]), float(values[-1])
+    H = 0.5 * (H + H.T)
+    owner = np.repeat(robots, [len(places) for places in columns])
+    return H, np.where(owner[:, None] == owner, H, 0.0)
 
 
 def stay_near_last(
@@ -199,9 +187,10 @@ def cooperative_radius(config: Config, predictor: Predictor) -> float:
 
 @lru_cache(maxsize=2)  # the agents in one process ask for the same
 def _eigenvalue_ranges(config: Config, predictor: Predictor) -> tuple[tuple[float, float], ...]:
-    """Of each distinct planning step."""
+    """Least and largest eigenvalue of D⁻¹H at each distinct planning step; 1 lies between."""
     steps = distinct_steps(config, predictor.phases)
-    return tuple(eigenvalue_range(*team_hessian(config, predictor, step)) for step in steps)
+    each = (linalg.eigh(*team_hessian(config, predictor, k), eigvals_only=True) for k in steps)
+    return tuple((float(values[0]), float(values[-1])) for values in each)
 
 
 # ---- damping of best responses, with the own cost

@@ -198,10 +198,6 @@ class Predictor:
             return self.parts.future_block(i, j, phase, self.phases)
         return self.block(i, j, phase)[:, self.layout.past :]
 
-    def couples(self, i: int, j: int) -> bool:
-        """Whether anything that agent j does has an effect on agent i."""
-        return any(self.block(i, j, phase).any() for phase in range(self.phases))
-
     def arrays(self) -> Mapping[str, Array]:
         """What it is made of, by name: with the meta all that a file must hold."""
         return self.parts.arrays() if isinstance(self.parts, PeriodicFactors) else {"G": self.parts}

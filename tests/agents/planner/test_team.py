@@ -10,8 +10,6 @@ import numpy as np
 import pytest
 
 from quadriga.agents.gait import horizon_stance
-from quadriga.agents.planner.peers import PeerTerms
-from quadriga.agents.planner.planner import Planner, PlannerState
 from quadriga.agents.planner.team import build_centralised
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config
@@ -42,21 +40,6 @@ def test_no_feasible_change_of_the_forces_is_better(
             tried += 1
             assert team_cost(small, predictor, inputs, other) >= best * (1.0 - 1e-12)
     assert tried > 10 or size > 2.0
-
-
-def test_robots_that_do_not_influence_each_other_plan_as_if_alone(
-    small: Config, predictor: Predictor
-) -> None:
-    apart = predictor.G.copy()
-    apart[:, 0, 1] = apart[:, 1, 0] = 0.0
-    uncoupled = Predictor(predictor.meta, apart)
-    inputs = disturbed(small, 4)
-    together = build_centralised(small, uncoupled).step(inputs)
-    for i, own in enumerate(inputs):
-        planner = Planner(small, i, uncoupled)
-        alone = planner.step(PlannerState(), own, PeerTerms())[1]
-        np.testing.assert_allclose(together.u[i], alone.u, atol=1e-6)
-        np.testing.assert_allclose(together.y[i], alone.y, atol=1e-6)
 
 
 def test_the_plan_is_what_the_team_will_do(

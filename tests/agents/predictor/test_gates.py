@@ -13,13 +13,12 @@ import pytest
 from scipy import integrate, optimize
 
 from quadriga.agents.gait import horizon_stance
-from quadriga.agents.predictor.episode import Y_SCALE, Episode
+from quadriga.agents.predictor.episode import Episode
 from quadriga.agents.predictor.gates import (
     Bounds,
     GateReport,
     Provenance,
     best_response_map,
-    coupling_table,
     height_gains,
     held_out_error,
     iteration_radius,
@@ -263,15 +262,6 @@ def test_the_worst_phase_counts(plant: Config, predictor: Predictor) -> None:
     )
     assert iteration_radius(plant, phased(loose, tight.G)) == pytest.approx(expected)
     assert iteration_radius(plant, loose) < 0.5 * expected
-
-
-def test_the_table_of_coupling_has_the_norms_of_scaled_blocks(predictor: Predictor) -> None:
-    z_scale = np.r_[np.full(48, 10.0), np.tile(Y_SCALE, 4), np.full(96, 10.0)]
-    scaled = predictor.G[0] * z_scale / np.tile(Y_SCALE, 8)[:, None]
-    found = coupling_table(predictor)
-    np.testing.assert_allclose(found, np.linalg.norm(scaled, axis=(2, 3)))
-    assert found[0, 0] > found[0, 1] > 0.0
-    np.testing.assert_allclose(coupling_table(phased(predictor, 2.0 * predictor.G)), 2.0 * found)
 
 
 # ---- whether the plans converge

@@ -38,11 +38,6 @@ def test_the_sliding_gram_matrix_is_that_of_the_explicit_hankel_matrix(
     np.testing.assert_allclose(gram([short, *signals], L), H @ H.T, atol=1e-10)
 
 
-@pytest.mark.parametrize(("robots", "samples"), [(5, 5794), (10, 18754)])
-def test_required_samples_of_large_teams(robots: int, samples: int) -> None:
-    assert required_samples(12 * robots, 10, 25, 12 * robots) == samples
-
-
 SINE = np.sin(0.7 * np.arange(200))[:, None]
 
 
