@@ -18,14 +18,14 @@ ROOTS: Final = (*WALLS, "quadriga", "benchmarks")
 # Lines of each package, of Python and of pages, docstrings and blanks included. Lowering one is
 # always right; raising one needs a reason beside it.
 BUDGETS: Final[Mapping[str, int]] = {
-    "agents": 9_760,  # planned: 8,000; left: cooperation, periodic fits, rigid body, validation
+    "agents": 9_575,  # planned: 8,000; left: cooperation, periodic fits, rigid body, validation
     "plant": 1_145,  # planned: 1,000; left: states and commands over the bus
     "sim_server": 2_640,  # planned: 2,600
     "bridges": 1_950,
-    "shared": 8_770,  # planned: 7,200; left: Unitree's protocols, the barrier, 640 lines of keys
-    "quadriga": 39_735,  # planned: 18,200; left: harnesses of experiments, report, commands
+    "shared": 8_730,  # planned: 7,200; left: Unitree's protocols, the barrier, 640 lines of keys
+    "quadriga": 39_730,  # planned: 18,200; left: harnesses of experiments, report, commands
     "benchmarks": 4_300,  # planned: 1,800
-    "tests": 45_710,  # planned: 28,000
+    "tests": 45_265,  # planned: 28,000
 }
 COUNTED: Final = (".py", ".js", ".css", ".html")
 MOST_ARGUMENTS: Final = 8

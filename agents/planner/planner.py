@@ -31,7 +31,6 @@ from quadriga.agents.planner.solver import (
     SOLVED,
     SOLVERS,
     DaqpSolver,
-    QpSolution,
     SolvedQp,
     no_solution,
 )
@@ -218,24 +217,18 @@ class Planner:
         if not peers.lost:
             solution = setup.solver.solve(f, error)
             qp = SolvedQp(problem.shifted(error), f, solution)
-        return self._fall_back(setup, inputs, solution, last, y_free), qp
-
-    def _fall_back(
-        self, setup: _Setup, inputs: PlannerInputs, solution: QpSolution, last: Array, y_free: Array
-    ) -> PlanResult:
-        """The plan of a solver's answer, or nominal forces where there is none."""
         x, status = solution.x, solution.status
         if self._kept and status == SOLVED:
             x = (1.0 - self._kept) * x + self._kept * last
-        du, dy = unpack(setup.problem, x, y_free)
+        du, dy = unpack(problem, x, y_free)
         y, y_nominal = inputs.y_base + dy, inputs.y_base + y_free.reshape(dy.shape)
         if not (are_plausible_outputs(y) and are_plausible_outputs(y_nominal)):
             # The outputs cannot be predicted: nominal forces, and the desired outputs as a guess.
             du, y, y_nominal = np.zeros_like(du), inputs.y_des, inputs.y_des
             status = IMPLAUSIBLE if status == SOLVED else status
         status = SOLVED if status == SOLVED else with_detail(NOMINAL, status)
-        u = setup.prediction.nominal + du
-        return PlanResult(status, u, du, y, y_nominal, solution.residuals, solution.iterations)
+        u, proof = setup.prediction.nominal + du, (solution.residuals, solution.iterations)
+        return PlanResult(status, u, du, y, y_nominal, *proof), qp
 
     def _last(self, problem: PlannerProblem, state: PlannerState, step: int) -> Array:
         """The last plan's deviations of the QP's forces, brought forward to a step. (nv,), N."""

@@ -29,7 +29,7 @@ FACTORS: Final = ("response", "free", "wrench")  # arrays of a periodic predicto
 DEGREE: Final = 3  # of the polynomials of the phase in a response
 FREE_ORDER: Final = 1  # harmonics of the map from the past
 FOLDS: Final = 10
-_ROWS: Final = 2048  # rows held in memory at a time
+_ROWS: Final = 2048  # rows held in memory at a time; of draws, which are shorter, twice as many
 _LEAST_FOLDS: Final = 3
 _ROUNDING: Final = 1e-6  # rad: an angle this much before a half begins is meant to be its begin
 _SAME: Final = 1e-9  # inputs of an agent that differ by less are held
@@ -293,7 +293,7 @@ def _rows(walks: Sequence[_Walk], first: int, ahead: int, *, starts: bool) -> li
         at = walk.starts if starts else np.arange(len(walk.w))
         usable.append(at[(at >= first) & (at <= len(walk.w) - ahead)])
     total, seen, rows = sum(map(len, usable)), 0, list[_Rows]()
-    size = max(1, min(_ROWS, -(-total // FOLDS))) if starts else _ROWS
+    size = max(1, min(2 * _ROWS, -(-total // FOLDS))) if starts else _ROWS
     for walk, at in zip(walks, usable, strict=True):
         for begin in range(0, len(at), size):
             rows.append(_Rows(walk, at[begin : begin + size], seen * FOLDS // total))

@@ -10,7 +10,7 @@ import numpy as np
 
 from quadriga.agents.planner.peers import PeerData, Peers, PeerTerms
 from quadriga.agents.planner.planner import Planner, PlannerInputs, PlannerState, PlanResult
-from quadriga.agents.predictor.predictor import Predictor
+from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robots.conventions import Array
 from tests.a1 import WEIGHT, nominal_forces
@@ -69,6 +69,24 @@ def disturbed(config: Config, seed: int, size: float = 1.0) -> list[PlannerInput
         )
         for _ in range(config.team.robots)
     ]
+
+
+def coupled(config: Config, seed: int, strength: float) -> Predictor:
+    """Any G of a plausible size whose blocks off the diagonal are `strength` times as large.
+
+    What a robot does to itself it does to others too, in part, so that the blocks are alike.
+    """
+    meta = PredictorMeta.of(config)
+    rng, n = np.random.default_rng(seed), meta.robots
+    shape = (meta.N, 6, meta.layout.width)
+    size = 1e-4 * np.array([1.0, 30.0, 30.0, 10.0, 10.0, 30.0])[:, None]
+    own = [rng.normal(size=shape) * size for _ in range(n)]
+    G = np.empty((1, n, n, 6 * meta.N, meta.layout.width))
+    for i in range(n):
+        for j in range(n):
+            mixed = own[j] if i == j else strength * (own[j] + 0.3 * rng.normal(size=shape) * size)
+            G[0, i, j] = mixed.reshape(6 * meta.N, meta.layout.width)
+    return Predictor(meta, G)
 
 
 def terms_of(

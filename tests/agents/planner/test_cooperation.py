@@ -28,7 +28,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.robots.conventions import Array
 from tests.a1 import nominal_forces
-from tests.agents.calm import STEP, Team, disturbed, inputs_of, peer, team_cost, terms_of
+from tests.agents.calm import STEP, Team, coupled, disturbed, inputs_of, peer, team_cost, terms_of
 from tests.agents.conftest import fit_ridge
 
 ROUNDS = 200  # within which strongly coupled plans are as good as the central planner's
@@ -38,24 +38,6 @@ def cooperative(config: Config, robots: int = 3, **changes: Any) -> Config:
     """The configuration with the team's cost."""
     planner = replace(config.planner, cost="team", **changes)
     return replace(config, team=replace(config.team, robots=robots), planner=planner)
-
-
-def coupled(config: Config, seed: int, strength: float) -> Predictor:
-    """Any G of a plausible size whose blocks off the diagonal are `strength` times as large.
-
-    What a robot does to itself it does to others too, in part, so that the blocks are alike.
-    """
-    meta = PredictorMeta.of(config)
-    rng, n = np.random.default_rng(seed), meta.robots
-    shape = (meta.N, 6, meta.layout.width)
-    size = 1e-4 * np.array([1.0, 30.0, 30.0, 10.0, 10.0, 30.0])[:, None]
-    own = [rng.normal(size=shape) * size for _ in range(n)]
-    G = np.empty((1, n, n, 6 * meta.N, meta.layout.width))
-    for i in range(n):
-        for j in range(n):
-            mixed = own[j] if i == j else strength * (own[j] + 0.3 * rng.normal(size=shape) * size)
-            G[0, i, j] = mixed.reshape(6 * meta.N, meta.layout.width)
-    return Predictor(meta, G)
 
 
 class Round:

@@ -32,6 +32,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robots.conventions import OUTPUTS, Array
 from tests.a1 import TOTAL_MASS, build_problem
+from tests.agents.calm import coupled
 from tests.agents.conftest import fit_ridge
 from tests.agents.predictor.plants import Sizes, first_window, random_plant, record
 
@@ -44,16 +45,6 @@ def predictor(plant: Config, linear_team: Team) -> Predictor:
     """The truth of the linear team, but for rounding."""
     meta = replace(PredictorMeta.of(plant), ridge=1e-9, block_weight=1.0)
     return fit_ridge([linear_team(2).episode(1500, 1)], meta)
-
-
-def coupled(config: Config, seed: int, strength: float) -> Predictor:
-    """Any G of a plausible size whose blocks off the diagonal are `strength` times as large."""
-    meta = PredictorMeta.of(config)
-    shape = (meta.robots, meta.robots, meta.N, 6, meta.layout.width)
-    G = np.random.default_rng(seed).normal(size=shape)
-    G *= 1e-4 * np.array([1.0, 30.0, 30.0, 10.0, 10.0, 30.0])[:, None]
-    G *= np.where(np.eye(meta.robots), 1.0, strength)[:, :, None, None, None]
-    return Predictor(meta, G.reshape(1, meta.robots, meta.robots, -1, meta.layout.width))
 
 
 def of_kind(config: Config, kind: str) -> Config:
