@@ -25,7 +25,7 @@ BUDGETS: Final[Mapping[str, int]] = {
     "shared": 8_730,  # planned: 7,200; left: Unitree's protocols, the barrier, 640 lines of keys
     "quadriga": 39_730,  # planned: 18,200; left: harnesses of experiments, report, commands
     "benchmarks": 4_300,  # planned: 1,800
-    "tests": 45_265,  # planned: 28,000
+    "tests": 45_275,  # planned: 28,000
 }
 COUNTED: Final = (".py", ".js", ".css", ".html")
 MOST_ARGUMENTS: Final = 8

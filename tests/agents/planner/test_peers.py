@@ -105,6 +105,16 @@ def test_the_first_planning_step_needs_nobodys_plan() -> None:
     assert not peers[1].known.any()
 
 
+def test_a_peer_that_plans_no_more_is_silent_and_then_lost() -> None:
+    """Whether it ever planned or not."""
+    for memory, first in ((NEIGHBOURS.initial(), FIRST), (remember(15, [15], []), 16)):
+        steps = range(first, first + 7)
+        seen = [of(memory, step).status for step in steps]
+        assert seen == [USABLE] * 3 + [SILENT] * 3 + [LOST]
+        lost = ["r2" in NEIGHBOURS.lost_peers(memory, step - 1, FIRST) for step in steps]
+        assert lost == [False] * 6 + [True]
+
+
 @pytest.mark.parametrize(
     ("stands_at", "step", "status"),
     [
