@@ -18,7 +18,7 @@ ROOTS: Final = (*WALLS, "quadriga", "benchmarks")
 # Lines of each package, of Python and of pages, docstrings and blanks included. Lowering one is
 # always right; raising one needs a reason beside it.
 BUDGETS: Final[Mapping[str, int]] = {
-    "agents": 9_575,  # planned: 8,000; left: cooperation, periodic fits, rigid body, validation
+    "agents": 9_570,  # planned: 8,000; left: cooperation, periodic fits, rigid body, validation
     "plant": 1_145,  # planned: 1,000; left: states and commands over the bus
     "sim_server": 2_640,  # planned: 2,600
     "bridges": 1_950,

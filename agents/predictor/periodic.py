@@ -151,23 +151,6 @@ class PeriodicFactors:
         """The factors, by name."""
         return {name: getattr(self, name) for name in FACTORS}
 
-    def check(self, layout: Layout) -> None:
-        """Refuse factors of another team or plant.
-
-        Raises:
-            PredictorError: it names the first array whose shape does not fit.
-        """
-        n, N, w = layout.agents, layout.N, len(self.wrench)
-        ends = {
-            "response": (N, n, w, n, layout.outputs),
-            "free": (n, n, layout.rows, (w + layout.outputs) * layout.T_ini),
-            "wrench": (layout.inputs,),
-        }
-        for name, end in ends.items():
-            shape = getattr(self, name).shape
-            if shape[1:] != end:
-                raise PredictorError(f"predictor.{name}", f"shape {shape}", f"(…, {end})")
-
     def block(self, i: int, j: int, phase: int, phases: int) -> Array:
         """G_ij of one of `phases` equal parts of the period. Shape (p N, (m + p) T_ini + m N)."""
         free, components = self.free[:, i, j], len(self.wrench)

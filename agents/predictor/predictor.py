@@ -154,17 +154,23 @@ class Predictor:
     parts: Array | PeriodicFactors
 
     def __post_init__(self) -> None:
-        parts, n = self.parts, self.meta.robots
-        agents = (parts.free if isinstance(parts, PeriodicFactors) else parts).shape[1:2]
+        arrays, n = self.arrays(), self.meta.robots
+        agents = arrays["free" if "free" in arrays else "G"].shape[1:2]
         if agents != (n,):  # before the layout: a file may claim any number
             raise PredictorError("predictor", f"arrays of {agents} agents", f"{n}")
-        layout = self.layout
-        expected = (self.phases, layout.agents, layout.agents, layout.rows, layout.width)
-        if isinstance(parts, PeriodicFactors):
-            parts.check(layout)
-        elif parts.shape != expected:
-            raise PredictorError("predictor.G", f"shape {parts.shape}", f"{expected}")
-        for array in self.arrays().values():
+        layout, w = self.layout, len(arrays.get("wrench", ()))
+        n = layout.agents
+        expected = {
+            "G": (n, n, layout.rows, layout.width),
+            "response": (layout.N, n, w, n, layout.outputs),
+            "free": (n, n, layout.rows, (w + layout.outputs) * layout.T_ini),
+            "wrench": (layout.inputs,),
+        }
+        for name, array in arrays.items():
+            first = self.phases if name == "G" else len(array)
+            if array.shape != (first, *expected[name]):
+                wanted = f"{(first, *expected[name])}"
+                raise PredictorError(f"predictor.{name}", f"shape {array.shape}", wanted)
             array.setflags(write=False)
 
     @property
