@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import field, replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -21,10 +21,10 @@ from quadriga.agents.gait import Gait
 from quadriga.agents.modes import ModeRules, ResumeState, Statuses, newest_statuses, ramp
 from quadriga.agents.planner.solver import SOLVED, SolvedQp
 from quadriga.agents.planner.team import Collected
-from quadriga.agents.planning.active_plan import Setpoint, setpoint_at
-from quadriga.agents.planning.interface import Expected, PlanningInputs, PlanningOutputs
+from quadriga.agents.planning.active_plan import PlanCheck, Setpoint, setpoint_at
+from quadriga.agents.planning.interface import ActivePlan, Expected, PlanningInputs, PlanningOutputs
 from quadriga.agents.planning.references import reference_at, remember_references
-from quadriga.agents.planning.registry import PlanningState, build_planning
+from quadriga.agents.planning.registry import build_planning
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.agents.stand_up import StandUp, StandUpRules
 from quadriga.agents.step_io import Inputs as Inputs
@@ -56,13 +56,15 @@ _LONGEST_DT: Final = 0.02  # s, after a gap in the ticks the filters advance by 
 class AgentState:
     """Everything the agent remembers between ticks.
 
+    `planning` is known to the planner alone, `plans` are in force or waiting for their start;
     `stand_up` is there while the robot stands up; `readings` and `standing_since` are known to
     `agents.validate`.
     """
 
     tick: int
     mode: Mode
-    planning: PlanningState
+    planning: Any
+    plans: tuple[ActivePlan, ...] = ()
     controller_state: RobotState | None = None
     references: tuple[Reference, ...] = ()
     last_tau: Array = field(default_factory=lambda: np.zeros(12))
@@ -100,6 +102,7 @@ class Agent:
         self.index = robot_names(config.team.robots).index(robot)
         self._gains = gains_row(config)
         self._planning = build_planning(config, self.index, predictor, clock_ns, collected)
+        self._plan_check = PlanCheck(config, self.index)
         self._by_truth = config.estimator.kind == "truth"
         self._height = config.reference.height
         self._modes, self._stand_up = ModeRules(config, robot), StandUpRules(config)
@@ -180,10 +183,11 @@ class Agent:
         measurement = self._sample_measurement(state, tick, robot)
         asked = PlanningInputs(tick, mode, followed, measurement, inputs.measurements, inputs.plans)
         planning, planned = self._planning.step(state.planning, asked)
+        planned, plans = self._plan_check.admit(planned, asked, state.plans)
         if planned.stop_reason:
             stops.append(Stop(STOPPING, planned.stop_reason))
 
-        setpoint = setpoint_at(planning.plans, tick)
+        setpoint = setpoint_at(plans, tick)
         trunk = self._trunk_command(tick, mode, reference, setpoint, inputs.excitation)
         new_sample = tick // SAMPLE_MS != state.tick // SAMPLE_MS
         controlled, solution = control(robot, trunk, self._gains, new_sample=new_sample)
@@ -209,6 +213,7 @@ class Agent:
             tick,
             mode,
             planning,
+            plans,
             controller_state=controlled,
             references=references,
             last_tau=tau,

@@ -81,7 +81,7 @@ class Local:
     """Eq. 12: the QP of one robot, and its whole planning step with the peers' terms."""
 
     def __init__(self, config: Config, predictor: Predictor) -> None:
-        robots, past = range(config.team.robots), predictor.meta.past
+        robots, past = range(config.team.robots), predictor.layout.past
         self._config, self._predictor, self._past = config, predictor, past
         self._G_u = [np.ascontiguousarray(predictor.block(i, i)[:, past:]) for i in robots]
         self._G_past = [np.ascontiguousarray(predictor.block(i, i)[:, :past]) for i in robots]
@@ -162,7 +162,7 @@ class Team:
     """Eq. 7: one QP for all robots."""
 
     def __init__(self, config: Config, predictor: Predictor) -> None:
-        self._config, robots, past = config, range(config.team.robots), predictor.meta.past
+        self._config, robots, past = config, range(config.team.robots), predictor.layout.past
         G = np.block([[predictor.block(i, j)[:, past:] for j in robots] for i in robots])
         self._G_u = np.ascontiguousarray(G)
         G = np.block([[predictor.block(i, j)[:, :past] for j in robots] for i in robots])

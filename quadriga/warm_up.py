@@ -59,5 +59,5 @@ def _rehearse_agent(config: Config) -> None:
     planner = replace(config.planner, kind="distributed", exchanges=0)
     pair = replace(config, team=replace(config.team, robots=_ROBOTS), planner=planner)
     meta = PredictorMeta.of(pair)
-    nothing = np.zeros((meta.phases, _ROBOTS, _ROBOTS, N_OUTPUTS * meta.N, meta.width))
+    nothing = np.zeros((meta.phases, _ROBOTS, _ROBOTS, N_OUTPUTS * meta.N, meta.layout.width))
     rehearse(pair, Agent(pair, "r1", Predictor(meta, nothing)))

@@ -8,11 +8,10 @@ that whoever only reads a configuration imports no planner.
 from __future__ import annotations
 
 import hashlib
-import json
 import math
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
@@ -40,20 +39,17 @@ class PlannerKind:
         title: what it does, in a few words.
         build: "module:function" that builds an agent's planning part, a `PlanningInterface`, from
             the configuration, the agent's place in the team, the predictor or None, a clock, and,
-            of a kind that needs data, a function that reads the collected episodes; "" of one
-            that stands in for a kind that is not installed, and whose title names its package.
+            of a kind that needs data, a function that reads the collected episodes.
         build_team: "module:function" that builds the `TeamPlanner` of a kind that is one process
             for the whole team, from the configuration, the predictor or None, and a function that
             reads the collected episodes; "" for all other kinds.
         needs_predictor: whether it plans with a fitted predictor, which then has to pass the gates.
-        needs_peers: whether agents respond to their peers' plans. Then the best-response gate
-            applies, and the check of the delay holds every plan against the peers' plans.
+        needs_peers: whether agents, which plan for themselves, respond to their peers' plans. Then
+            the best-response gate applies, and the check of the delay holds every plan against the
+            peers' plans.
         needs_data: whether it plans with the collected data themselves.
         publishes: whether plans are published; if so they are missed where there are none.
         options: numbers that `planner.options` may set, with their defaults.
-
-    Raises:
-        ValueError: facts that contradict each other.
     """
 
     name: str
@@ -65,10 +61,6 @@ class PlannerKind:
     needs_data: bool = False
     publishes: bool = True
     options: Mapping[str, float] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        if self.central and self.needs_peers:
-            raise ValueError(f"{self.name}: one process plans for all, so no agent needs its peers")
 
     @property
     def central(self) -> bool:
@@ -113,7 +105,6 @@ BUILT_IN: Final[Mapping[str, PlannerKind]] = {
         ),
     )
 }
-_ABSENT: Final[dict[str, PlannerKind]] = {}  # kinds of recordings, by name
 
 
 def find_kind(name: str) -> PlannerKind:
@@ -122,30 +113,7 @@ def find_kind(name: str) -> PlannerKind:
     Raises:
         ConfigError: no installed package has such a kind, or two have; or it cannot be imported.
     """
-    if name in _ABSENT and name not in installed_kinds():
-        return _ABSENT[name]
     return BUILT_IN.get(name) or _find_plugin(name)
-
-
-def describe_plugin(name: str) -> str:
-    """What `stand_in` needs to know of a plug-in's kind, as JSON; "" of a built-in one."""
-    kind, origin = find_kind(name), plugin_origin(name)
-    facts = {item.name: getattr(kind, item.name) for item in fields(kind)}
-    facts |= {"title": origin, "build": "", "options": dict(kind.options)}
-    return json.dumps(facts) if origin else ""
-
-
-def stand_in(name: str, described: str) -> None:
-    """Let recordings of a kind be read whose package is not installed; nothing can plan with it.
-
-    Args:
-        name: of the kind.
-        described: see `describe_plugin`; with anything else the kind stays unknown.
-    """
-    with suppress(ValueError, TypeError, AttributeError, RecursionError):
-        kind = PlannerKind(**json.loads(described) | {"name": name, "build": ""})
-        options = {option: float(value) for option, value in kind.options.items()}
-        _ABSENT[name] = replace(kind, options=options)
 
 
 def installed_kinds() -> tuple[str, ...]:
@@ -158,11 +126,8 @@ def load_builder(kind: PlannerKind, reference: str) -> Any:
     """What a kind's `build` or `build_team` names.
 
     Raises:
-        ConfigError: there is no such module or function, or it cannot be imported; or the kind is
-            that of a recording, and not installed.
+        ConfigError: there is no such module or function, or it cannot be imported.
     """
-    if not kind.build:
-        raise ConfigError(_KEY, repr(kind.name), "an installed kind", f"install {kind.title}")
     module, _, name = reference.partition(":")
     try:
         return getattr(import_module(module), name)

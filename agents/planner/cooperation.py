@@ -32,13 +32,11 @@ innovation, the difference δ between its window and the one that its last plan 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import lru_cache
 from typing import Final
 
 import numpy as np
 from scipy import linalg
-from scipy.sparse.linalg import eigsh
 
 from quadriga.agents.gait import distinct_steps, horizon_stance, phase_of
 from quadriga.agents.planner.qp import (
@@ -54,7 +52,6 @@ from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.robots.conventions import N_OUTPUTS, Array
 
 TEAM: Final = "team"  # of planner.cost
-_TOLERANCE: Final = 1e-6  # of the eigenvalues
 _BY_SIZE: Final = -1.0  # value of planner.damping
 
 
@@ -73,18 +70,16 @@ def brings_forward(config: Config) -> bool:
 
 
 def coupled_peers(config: Config, index: int, predictor: Predictor) -> frozenset[int]:
-    """Robots whose plans matter to agent `index`: those whose forces move its outputs.
+    """Robots whose plans matter to agent `index`: the members that explain its outputs.
 
-    With the team's cost also those whose forces move an output that its own forces move.
+    With the team's cost also those that explain an output which its own forces move.
     """
     if not find_kind(config.planner.kind).needs_peers:
         return frozenset()
-    robots = range(config.team.robots)
-    if predictor.meta.neighbours == "all":
-        return frozenset(robots) - {index}
-    moves = np.array([[predictor.couples(j, i) for i in robots] for j in robots])
-    moved = moves[:, index] if is_cooperative(config) else np.arange(len(robots)) == index
-    return frozenset(np.flatnonzero(moves[moved].any(axis=0)).tolist()) - {index}
+    members = predictor.layout.members
+    moved = [each for each in members if index in each]
+    matter = moved if is_cooperative(config) else [members[index]]
+    return frozenset().union(*matter) - {index}
 
 
 def team_slope(config: Config, predictor: Predictor, index: int, step: int) -> Array:
@@ -109,7 +104,7 @@ def build_team_problem(
     The last sum comes from the peers (`peer_slope`). The predicted outputs are the agent's own.
     """
     phase, stance = phase_of(config, step, predictor.phases), horizon_stance(config, index, step)
-    past, columns = predictor.meta.past, stance_columns(stance)
+    past, columns = predictor.layout.past, stance_columns(stance)
     slopes = team_slope(config, predictor, index, step)
     F_past = np.zeros((len(columns), past))
     H = np.diag(np.tile(config.planner.R, len(columns) // 3))
@@ -133,44 +128,23 @@ def peer_slope(slopes: Array, predictor: Predictor, peer: int, phase: int) -> Ar
 
     `slopes` are the `team_slope` of agent i.
     """
-    M = np.zeros((slopes.shape[1], predictor.meta.width))
+    M = np.zeros((slopes.shape[1], predictor.layout.width))
     for j, slope in enumerate(slopes):
         M += slope @ predictor.block(j, peer, phase)
     return M
 
 
-def team_hessian(config: Config, predictor: Predictor, step: int) -> tuple[Array, list[int]]:
-    """Hessian of V by all agents' stance forces, (s, s), and how many of them each agent has."""
+def team_hessian(config: Config, predictor: Predictor, step: int) -> tuple[Array, Array]:
+    """H, the Hessian of V by all agents' stance forces, and D, its block diagonal. (s, s) each."""
     robots, phase = range(config.team.robots), phase_of(config, step, predictor.phases)
     columns = [stance_columns(horizon_stance(config, i, step)) for i in robots]
     G = np.block([[predictor.future_block(i, j, phase)[:, columns[j]] for j in robots]
                   for i in robots])  # fmt: skip
     H = (G.T * np.tile(config.planner.Q, len(G) // N_OUTPUTS)) @ G
     H.flat[:: len(H) + 1] += np.tile(config.planner.R, len(H) // 3)
-    return 0.5 * (H + H.T), [len(places) for places in columns]
-
-
-def eigenvalue_range(H: Array, sizes: Sequence[int]) -> tuple[float, float]:
-    """Least and largest eigenvalue of D⁻¹H, D being the blocks of these sizes on the diagonal of H.
-
-    They are those of the symmetric L⁻¹ H L⁻ᵀ with D = L Lᵀ. Their mean is 1, which lies between.
-    """
-    whitened, ends = H.copy(), np.cumsum(sizes)
-    for end, size in zip(ends, sizes, strict=True):
-        part = slice(end - size, end)
-        factor = linalg.cholesky(H[part, part], lower=True)
-        whitened[part] = linalg.solve_triangular(factor, whitened[part], lower=True)
-        whitened[:, part] = linalg.solve_triangular(factor, whitened[:, part].T, lower=True).T
-    # A start that is fixed, so that equal data give equal bits.
-    least, most = eigsh(
-        0.5 * (whitened + whitened.T),
-        k=2,
-        which="BE",
-        v0=np.ones(len(H)),
-        tol=_TOLERANCE,
-        return_eigenvectors=False,
-    )
-    return float(least), float(most)
+    H = 0.5 * (H + H.T)
+    owner = np.repeat(robots, [len(places) for places in columns])
+    return H, np.where(owner[:, None] == owner, H, 0.0)
 
 
 def stay_near_last(
@@ -213,16 +187,17 @@ def cooperative_radius(config: Config, predictor: Predictor) -> float:
 
 @lru_cache(maxsize=2)  # the agents in one process ask for the same
 def _eigenvalue_ranges(config: Config, predictor: Predictor) -> tuple[tuple[float, float], ...]:
-    """Of each distinct planning step."""
+    """Least and largest eigenvalue of D⁻¹H at each distinct planning step; 1 lies between."""
     steps = distinct_steps(config, predictor.phases)
-    return tuple(eigenvalue_range(*team_hessian(config, predictor, step)) for step in steps)
+    each = (linalg.eigh(*team_hessian(config, predictor, k), eigvals_only=True) for k in steps)
+    return tuple((float(values[0]), float(values[-1])) for values in each)
 
 
 # ---- damping of best responses, with the own cost
 
 
 def kept_share(config: Config) -> float:
-    """d, the share of its own last plan that an agent's best response keeps.
+    """d, the share of its own last plan that a best response keeps; chosen, 0 if it answers nobody.
 
     By the size of the team: where n robots act on each other alike, with effects c of their own,
     the undamped map has the eigenvalues c and −c (n − 1). Keeping d, the largest in size is least
@@ -235,10 +210,5 @@ def kept_share(config: Config) -> float:
     if planner.damping != _BY_SIZE:
         return planner.damping
     few = 3 if planner.preset == "usual" else 2
-    return 0.0 if n <= few else (n - 2) / (n + 2)
-
-
-def kept_by_agent(config: Config) -> float:
-    """`kept_share`, but for agents that answer nobody, whatever the size of the team."""
-    answers, by_size = find_kind(config.planner.kind).needs_peers, config.planner.damping < 0.0
-    return 0.0 if by_size and not answers else kept_share(config)
+    answers = find_kind(planner.kind).needs_peers
+    return (n - 2) / (n + 2) if answers and n > few else 0.0

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
 from typing import Final, TypeVar
 
 import numpy as np
@@ -98,13 +99,11 @@ class PeerTerms:
         effect: Σ G_ij [u_ini; y_ini; u] over the peers, (6 N,).
         slope: Σ M_ij [u_ini; y_ini; u] over the peers, what they add to the slope of the team's
             cost by own stance forces, (nv,); 0 where each agent has its own cost.
-        step: planning step.
         peers: what this is made of.
     """
 
     effect: Array | float = 0.0
     slope: Array | float = 0.0
-    step: int = 0
     peers: tuple[PeerData, ...] = ()
 
     @property
@@ -227,7 +226,7 @@ class Neighbours:
         )
 
     def select(
-        self, memory: PeerMemory, last: int, first_step: int, *, window_step: int | None = None
+        self, memory: PeerMemory, last: int, first_step: int, end: int
     ) -> tuple[PeerData, ...]:
         """Choose the plan and the window of each peer that a planning step uses.
 
@@ -238,11 +237,9 @@ class Neighbours:
             memory: what has been remembered.
             last: newest step whose plans and samples are looked at; with the one-step delay k−1.
             first_step: the first planning step of the team, or since it walks again.
-            window_step: planning step at which the windows end: `last`, as in eq. 11, or a later
-                one, which moves windows and plans forward and takes samples not measured yet from
-                the plans.
+            end: planning step at which the windows end: `last`, as in eq. 11, or a later one, which
+                moves windows and plans forward and takes samples not measured yet from the plans.
         """
-        end = last if window_step is None else window_step
         config, planner, peers = self._config, self._config.planner, []
         for name, index in self._indices.items():
             history = memory.peers[name]
@@ -348,8 +345,7 @@ class Peers:
     def __init__(self, config: Config, index: int, predictor: Predictor) -> None:
         self._config, self._index, self._predictor = config, index, predictor
         self._others = [j for j in range(config.team.robots) if j != index]
-        # Memo of the couplings, one for each step of the gait's cycle; it changes no result.
-        self._couplings: dict[tuple[int, int], tuple[NDArray[np.int64], NDArray[np.float32]]] = {}
+        self._coupling = cache(self._build_coupling)  # of two steps of the gait's cycle
         self._cycle = walking_steps(config)
         self._cooperative = is_cooperative(config)
         behind = {0 if brings_forward(config) else 1}
@@ -358,7 +354,7 @@ class Peers:
         # The cycle's first step is set up twice: later its plans also begin at a step of the walk.
         for step in (*self._cycle, self._cycle.stop):
             for steps in behind:
-                self._coupling(step, step - steps)
+                self._coupling(*self._places(step, step - steps))
 
     def terms(
         self, peers: tuple[PeerData, ...], step: int, window_step: int, y_base: Array
@@ -373,28 +369,28 @@ class Peers:
         """
         if not peers:
             return PeerTerms()
-        z = np.zeros((len(self._others), self._predictor.meta.width), dtype=np.float32)
+        z = np.zeros((len(self._others), self._predictor.layout.width), dtype=np.float32)
         for peer in peers:
             if peer.status == USABLE:
                 dy = np.where(peer.known[:, None], peer.y_ini - y_base, 0.0)
                 z[peer.index - (peer.index > self._index)] = np.concatenate(
                     [peer.du_ini.ravel(), dy.ravel(), peer.du.ravel()]
                 )
-        columns, rows = self._coupling(step, window_step)
+        columns, rows = self._coupling(*self._places(step, window_step))
         total = (rows @ z.ravel()[columns]).astype(np.float64)
         outputs = N_OUTPUTS * self._config.planner.N
         slope = total[outputs:] if self._cooperative else 0.0
-        return PeerTerms(total[:outputs], slope, step, peers)
+        return PeerTerms(total[:outputs], slope, peers)
 
-    def _coupling(
+    def _places(self, *steps: int) -> tuple[int, ...]:
+        return tuple(place_in(self._cycle, step) for step in steps)
+
+    def _build_coupling(
         self, step: int, window_step: int
     ) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
         """Of all peers' z at a step, whose plans begin at `window_step`: places, and rows of G."""
-        place = place_in(self._cycle, step), place_in(self._cycle, window_step)
-        if place not in self._couplings:
-            stance = [horizon_stance(self._config, j, window_step) for j in self._others]
-            self._couplings[place] = couple(self._blocks(step), stance)
-        return self._couplings[place]
+        stance = [horizon_stance(self._config, j, window_step) for j in self._others]
+        return couple(self._blocks(step), stance)
 
     def _blocks(self, step: int) -> list[Array]:
         """G_ij of each peer; with the team's cost [G_ij; M_ij]."""

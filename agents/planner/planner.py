@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -18,7 +19,7 @@ from quadriga.agents.gait import (
 from quadriga.agents.planner.cooperation import (
     build_team_problem,
     is_cooperative,
-    kept_by_agent,
+    kept_share,
     new_plan_share,
     stay_near_last,
 )
@@ -44,7 +45,6 @@ from quadriga.shared.runtime.record import record
 
 IMPLAUSIBLE: Final = "implausible"
 _OWN_COST: Final = np.zeros(0)  # instead of a linear term: it is computed with the plan
-_Planned = tuple[Array, Array, Array, Array, Residuals, int]
 
 
 @record
@@ -157,10 +157,9 @@ class Planner:
         self._config, self._index, self._predictor = config, index, predictor
         self._cycle = walking_steps(config)
         self._cooperative = is_cooperative(config)
-        self._kept = 0.0 if self._cooperative else kept_by_agent(config)
+        self._kept = 0.0 if self._cooperative else kept_share(config)
         self._new_share = new_plan_share(config, predictor) if self._cooperative else 1.0
-        # Memo of the set-ups, one for each step of the gait's cycle; it changes no result.
-        self._setups: dict[int, _Setup] = {}
+        self._setup = cache(self._build_setup)  # of a step of the gait's cycle
         for step in self._cycle:
             self._setup(step)
 
@@ -174,45 +173,33 @@ class Planner:
             inputs: the agent's own data.
             peers: the peers' terms of eq. 11.
         """
-        setup = self._setup(inputs.step)
-        forces, outputs, y_free, f, residuals, solutions = self._plan(setup, state, inputs, peers)
-        if solutions == FAILED:
-            result = self._fall_back(setup, state, inputs, peers, y_free, f)
-        else:
-            (u, du), (y, y_nominal) = forces, outputs
-            result = PlanResult(SOLVED, u, du, y, y_nominal, residuals, solutions)
+        result, _ = self._solve(state, inputs, peers, as_qp=False)
         return PlannerState(inputs.step, result.du, result.y), result
 
     def problem_of(
         self, state: PlannerState, inputs: PlannerInputs, peers: PeerTerms
     ) -> SolvedQp | None:
         """The QP of `step` for the same arguments; None if a peer is lost: then no QP is solved."""
-        if peers.lost:
-            return None
-        setup = self._setup(inputs.step)
-        _, _, y_free, f, _, _ = self._plan(setup, state, inputs, peers)
-        with np.errstate(over="ignore", invalid="ignore"):
-            error = y_free - inputs.wanted()
-            solution = setup.solver.solve(f, error)
-        return SolvedQp(setup.problem, f, *setup.problem.bounds(error), solution)
+        return self._solve(state, inputs, peers, as_qp=True)[1]
 
-    def _plan(
-        self, setup: _Setup, state: PlannerState, inputs: PlannerInputs, peers: PeerTerms
-    ) -> _Planned:
-        """See `_plan_step`."""
+    # Any number may be measured; one that overflows shows in the result.
+    @np.errstate(over="ignore", invalid="ignore")
+    def _solve(
+        self, state: PlannerState, inputs: PlannerInputs, peers: PeerTerms, *, as_qp: bool
+    ) -> tuple[PlanResult, SolvedQp | None]:
+        """The plan by compiled code; by a solver where that fails or the QP itself is asked for."""
+        setup = self._setup(place_in(self._cycle, inputs.step))
         problem, f, effect = setup.problem, _OWN_COST, peers.effect
         last = self._last(problem, state, inputs.step)
-        # Any number may be measured; one that overflows shows in the result.
         if self._cooperative:
-            with np.errstate(over="ignore", invalid="ignore"):
-                past = inputs.past()
-                f = problem.linear_term(past, inputs.wanted()) + peers.slope
-                innovation = self._innovation(past, state, inputs)
-                f = stay_near_last(problem, f, self._new_share, last, innovation)
+            past = inputs.past()
+            f = problem.linear_term(past, inputs.wanted()) + peers.slope
+            innovation = self._innovation(past, state, inputs)
+            f = stay_near_last(problem, f, self._new_share, last, innovation)
         if not isinstance(effect, np.ndarray):  # one type: machine code is made for each
             effect = np.full(len(setup.prediction.Y_past), effect)
         window = inputs.u_ini, inputs.y_ini, inputs.stance_ini, inputs.y_base_ini
-        return _plan_step(
+        forces, outputs, y_free, f, residuals, solutions = _plan_step(
             (*window, inputs.y_base, inputs.y_des),
             effect,
             f,
@@ -221,26 +208,18 @@ class Planner:
             setup.solver.force_qp,
             setup.solver.limits_feet and not peers.lost,
         )
-
-    @np.errstate(over="ignore", invalid="ignore")
-    def _fall_back(
-        self,
-        setup: _Setup,
-        state: PlannerState,
-        inputs: PlannerInputs,
-        peers: PeerTerms,
-        y_free: Array,
-        f: Array,
-    ) -> PlanResult:
-        """The plan by a solver, or nominal forces where there is none."""
-        problem = setup.problem
-        if peers.lost:
-            solution = no_solution(problem, PEER_LOST)
-        else:
-            solution = setup.solver.solve(f, y_free - inputs.wanted())
+        if solutions != FAILED and not as_qp:
+            (u, du), (y, y_nominal) = forces, outputs
+            return PlanResult(SOLVED, u, du, y, y_nominal, residuals, solutions), None
+        error = y_free - inputs.wanted()
+        qp: SolvedQp | None = None
+        solution = no_solution(problem, PEER_LOST)
+        if not peers.lost:
+            solution = setup.solver.solve(f, error)
+            qp = SolvedQp(problem.shifted(error), f, solution)
         x, status = solution.x, solution.status
         if self._kept and status == SOLVED:
-            x = (1.0 - self._kept) * x + self._kept * self._last(problem, state, inputs.step)
+            x = (1.0 - self._kept) * x + self._kept * last
         du, dy = unpack(problem, x, y_free)
         y, y_nominal = inputs.y_base + dy, inputs.y_base + y_free.reshape(dy.shape)
         if not (are_plausible_outputs(y) and are_plausible_outputs(y_nominal)):
@@ -248,8 +227,8 @@ class Planner:
             du, y, y_nominal = np.zeros_like(du), inputs.y_des, inputs.y_des
             status = IMPLAUSIBLE if status == SOLVED else status
         status = SOLVED if status == SOLVED else with_detail(NOMINAL, status)
-        u = setup.prediction.nominal + du
-        return PlanResult(status, u, du, y, y_nominal, solution.residuals, solution.iterations)
+        u, proof = setup.prediction.nominal + du, (solution.residuals, solution.iterations)
+        return PlanResult(status, u, du, y, y_nominal, *proof), qp
 
     def _last(self, problem: PlannerProblem, state: PlannerState, step: int) -> Array:
         """The last plan's deviations of the QP's forces, brought forward to a step. (nv,), N."""
@@ -271,15 +250,8 @@ class Planner:
         y[T_ini - since :] = inputs.y_ini[T_ini - since :] - state.y[:since]
         return innovation
 
-    def _setup(self, step: int) -> _Setup:
-        """The set-up of a step of the gait's cycle, from the memo."""
-        place = place_in(self._cycle, step)
-        if place not in self._setups:
-            self._setups[place] = self._build_setup(place)
-        return self._setups[place]
-
     def _build_setup(self, step: int) -> _Setup:
-        config, index, past = self._config, self._index, self._predictor.meta.past
+        config, index, past = self._config, self._index, self._predictor.layout.past
         stance, weight = horizon_stance(config, index, step), config.robot.weight
         if self._cooperative:
             problem = build_team_problem(config, self._predictor, index, step)
@@ -303,7 +275,7 @@ def _plan_step(
     prediction: _Prediction,
     qp: ForceQp,
     limits_feet: bool,
-) -> _Planned:
+) -> tuple[Array, Array, Array, Array, Residuals, int]:
     """Build, solve and unpack the QP of a step, in one call; without the fallback.
 
     The caches are lost between two steps: it takes mostly the time to load its code and data.

@@ -9,7 +9,7 @@ formulation (local eq. 12, centralised eq. 7, DeePC eq. 5) is such a `Condensed`
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -93,13 +93,13 @@ class PlannerProblem:
         f: Array = self.condensed.F_past @ past + self.condensed.F_des @ y_des
         return f
 
-    def bounds(self, error: Array | None = None) -> tuple[Array, Array]:
-        """Bounds of [v; A v] for a free response that is off y_des by `error`, shape (p N,)."""
+    def shifted(self, error: Array | None) -> PlannerProblem:
+        """With bounds for a free response that is off y_des by `error`, shape (p N,)."""
         if not len(self.bounded) or error is None:
-            return self.lower, self.upper
+            return self
         shift = np.zeros(len(self.lower))
         shift[-len(self.bounded) :] = error[self.bounded]
-        return self.lower - shift, self.upper - shift
+        return replace(self, lower=self.lower - shift, upper=self.upper - shift)
 
 
 def condense(
@@ -201,14 +201,11 @@ def is_optimal(found: Residuals) -> bool:
     return found.primal <= MAX_VIOLATION and found.stationarity <= MAX_STATIONARITY
 
 
-def residuals(
-    problem: PlannerProblem, f: Array, v: Array, multipliers: Array, error: Array | None = None
-) -> Residuals:
+def residuals(problem: PlannerProblem, f: Array, v: Array, multipliers: Array) -> Residuals:
     """Karush-Kuhn-Tucker residuals of an answer v; positive multipliers belong to upper bounds."""
-    low, high = problem.bounds(error)
     values = np.concatenate([v, problem.A @ v])
-    pull = problem.A.T @ multipliers[len(v) :]
-    return largest_residuals(problem.H @ v, f, pull, values, multipliers, low, high)
+    pull, bounds = problem.A.T @ multipliers[len(v) :], (problem.lower, problem.upper)
+    return largest_residuals(problem.H @ v, f, pull, values, multipliers, *bounds)
 
 
 @compiled

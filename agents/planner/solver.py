@@ -49,16 +49,13 @@ class SolvedQp:
     """A QP of one step, min ½ xᵀ H x + fᵀ x, lower ≤ [x; A x] ≤ upper, with its answer.
 
     Attributes:
-        problem: whose H and A these are.
+        problem: whose H, A and bounds these are.
         f: linear term, shape (nx,).
-        lower, upper: bounds, shape (nx + m,).
         solution: the solver's answer.
     """
 
     problem: PlannerProblem
     f: Array
-    lower: Array
-    upper: Array
     solution: QpSolution
 
 
@@ -84,41 +81,35 @@ class DaqpSolver:
         self._cold = np.zeros(len(problem.upper), dtype=np.int32)
         self._model = daqp.Model()
         self._model.settings = {"primal_tol": 1e-8}
-        zero = np.zeros(len(H))
-        bounds = self._within_reach(None)
-        self._ready, _ = self._model.setup(problem.H, zero, problem.A, *bounds, self._cold)
+        zero, reach = np.zeros(len(H)), _within_reach(problem)
+        self._ready, _ = self._model.setup(problem.H, zero, problem.A, *reach, self._cold)
         # The first solve loads the code, which must not fall into a walk.
         DaqpSolver.solve(self, zero)
-        self._solve_by_daqp(zero, None)
+        self._solve_by_daqp(zero, problem)
 
     def solve(self, f: Array, error: Array | None = None) -> QpSolution:
         """The minimiser, or the reason why there is none. Never raises for a bad f.
 
         Args:
             f: linear term, shape (nx,).
-            error: that bounds of outputs depend on, see `PlannerProblem.bounds`.
+            error: that bounds of outputs depend on, see `PlannerProblem.shifted`.
         """
         if self.limits_feet:
             found = minimise(self.force_qp, f)
             if found.solutions != FAILED:
                 return QpSolution(SOLVED, *found)
-        return self._solve_by_daqp(f, error)
+        return self._solve_by_daqp(f, self._problem.shifted(error))
 
-    def _solve_by_daqp(self, f: Array, error: Array | None) -> QpSolution:
+    def _solve_by_daqp(self, f: Array, problem: PlannerProblem) -> QpSolution:
         if self._ready < 0:  # contradictory bounds are detected at set-up
-            return no_solution(self._problem, _DAQP_STATUS.get(self._ready, "failed"))
+            return no_solution(problem, _DAQP_STATUS.get(self._ready, "failed"))
         if not math.isfinite(f @ f):
-            return no_solution(self._problem, "not-finite")
-        upper, lower = self._within_reach(error)
+            return no_solution(problem, "not-finite")
+        upper, lower = _within_reach(problem)
         self._model.update(f=f, sense=self._cold, bupper=upper, blower=lower)
         x, _, flag, info = self._model.solve()
         status = _DAQP_STATUS.get(flag, "failed")
-        return judge(self._problem, f, x, info["lam"], status, int(info["iterations"]), error)
-
-    def _within_reach(self, error: Array | None) -> tuple[Array, Array]:
-        """Upper and lower bounds in DAQP's order and with its infinity."""
-        lower, upper = self._problem.bounds(error)
-        return np.minimum(upper, _FAR), np.maximum(lower, -_FAR)
+        return judge(problem, f, x, info["lam"], status, int(info["iterations"]))
 
 
 class OsqpSolver(DaqpSolver):
@@ -136,9 +127,10 @@ class OsqpSolver(DaqpSolver):
 
     def solve(self, f: Array, error: Array | None = None) -> QpSolution:
         """See `DaqpSolver`."""
-        low, high = self._problem.bounds(error)
+        problem = self._problem.shifted(error)
+        low, high = problem.lower, problem.upper
         if not np.isfinite(f).all() or (low > high).any():
-            return self._solve_by_daqp(f, error)
+            return self._solve_by_daqp(f, problem)
         solver = osqp.OSQP()
         solver.setup(
             self._P,
@@ -158,8 +150,8 @@ class OsqpSolver(DaqpSolver):
         y = np.where(np.isinf(high), np.minimum(result.y, 0.0), result.y)
         y = np.where(np.isinf(low), np.maximum(y, 0.0), y)
         status, iterations = result.info.status, int(result.info.iter)
-        answer = judge(self._problem, f, result.x, y, status, iterations, error)
-        return answer if answer.status == SOLVED else self._solve_by_daqp(f, error)
+        answer = judge(problem, f, result.x, y, status, iterations)
+        return answer if answer.status == SOLVED else self._solve_by_daqp(f, problem)
 
 
 SOLVERS: Final[Mapping[str, type[DaqpSolver]]] = MappingProxyType(
@@ -174,21 +166,20 @@ def no_solution(problem: PlannerProblem, status: str) -> QpSolution:
 
 
 def judge(
-    problem: PlannerProblem,
-    f: Array,
-    v: Array,
-    multipliers: Array,
-    status: str,
-    iterations: int,
-    error: Array | None = None,
+    problem: PlannerProblem, f: Array, v: Array, multipliers: Array, status: str, iterations: int
 ) -> QpSolution:
     """Check an answer against the optimality conditions; one that fails is "inaccurate"."""
     if status != SOLVED:
         return no_solution(problem, status)
-    checked = residuals(problem, f, v, multipliers, error)
+    checked = residuals(problem, f, v, multipliers)
     if not is_optimal(checked):
         return replace(no_solution(problem, "inaccurate"), residuals=checked)
     return QpSolution(SOLVED, v, multipliers, checked, iterations)
+
+
+def _within_reach(problem: PlannerProblem) -> tuple[Array, Array]:
+    """Upper and lower bounds in DAQP's order and with its infinity."""
+    return np.minimum(problem.upper, _FAR), np.maximum(problem.lower, -_FAR)
 
 
 def _inversion_error(H: Array, inverse: Array) -> float:

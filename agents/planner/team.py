@@ -23,6 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,8 +80,7 @@ class TeamPlanner:
     def __init__(self, config: Config, formulation: Formulation, phases: int = 1) -> None:
         self._config, self._formulation, self._phases = config, formulation, phases
         self._cycle = walking_steps(config)
-        # Memo of the problems, one for each step of the gait's cycle; it changes no result.
-        self._setups: dict[int, tuple[PlannerProblem, DaqpSolver, Array]] = {}
+        self._setup = cache(self._build_setup)  # of a step of the gait's cycle
         for step in self._cycle:
             self._setup(step)
 
@@ -91,7 +91,7 @@ class TeamPlanner:
             inputs: of all robots in their order, of one step.
         """
         n, N = len(inputs), self._config.planner.N
-        problem, solver, nominal = self._setup(inputs[0].step)
+        problem, solver, nominal = self._setup(place_in(self._cycle, inputs[0].step))
         past = np.concatenate([robot.past() for robot in inputs])
         base = np.concatenate([robot.y_base for robot in inputs])
         y_des = np.concatenate([robot.y_des for robot in inputs]).ravel() - base.ravel()
@@ -104,17 +104,14 @@ class TeamPlanner:
             (base + dy).reshape(n, N, -1),
         )
 
-    def _setup(self, step: int) -> tuple[PlannerProblem, DaqpSolver, Array]:
+    def _build_setup(self, step: int) -> tuple[PlannerProblem, DaqpSolver, Array]:
         """The problem of a step, its solver, and the nominal forces of its horizon."""
-        place, config, weight = place_in(self._cycle, step), self._config, self._config.robot.weight
-        if place not in self._setups:
-            robots = range(config.team.robots)
-            stance = np.concatenate([horizon_stance(config, i, place) for i in robots])
-            condensed = self._formulation(phase_of(config, place, self._phases), stance)
-            problem = constrain(config.planner, weight, condensed, stance)
-            solver = SOLVERS[config.planner.solver](problem)
-            self._setups[place] = problem, solver, nominal_forces(stance, weight)
-        return self._setups[place]
+        config, weight, robots = self._config, self._config.robot.weight, self._config.team.robots
+        stance = np.concatenate([horizon_stance(config, i, step) for i in range(robots)])
+        condensed = self._formulation(phase_of(config, step, self._phases), stance)
+        problem = constrain(config.planner, weight, condensed, stance)
+        solver = SOLVERS[config.planner.solver](problem)
+        return problem, solver, nominal_forces(stance, weight)
 
 
 def build_centralised(
@@ -126,7 +123,7 @@ def build_centralised(
         PredictorError: the predictor's sizes are not the configuration's.
     """
     check_sizes(config, predictor)
-    past = predictor.meta.past
+    past = predictor.layout.past
 
     def formulation(phase: int, stance: NDArray[np.bool_]) -> Condensed:
         robots = range(config.team.robots)

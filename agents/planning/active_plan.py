@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import field, replace
 from typing import Any, Final
 
 import numpy as np
 
 from quadriga.agents.gait import nominal_forces, sample_starts, scheduled_stance, step_ms
+from quadriga.agents.planner.solver import NOMINAL
+from quadriga.agents.planning.interface import ActivePlan, PlanningInputs, PlanningOutputs
+from quadriga.agents.planning.references import reference_at
+from quadriga.agents.predictor.episode import commanded_outputs
+from quadriga.shared.codes import with_detail
 from quadriga.shared.config.sections import Config, PlannerConfig
 from quadriga.shared.messages import Plan
+from quadriga.shared.modes import WALK
 from quadriga.shared.robots.conventions import N_FORCES, N_LEGS, N_OUTPUTS, Array
 from quadriga.shared.runtime.record import record
 from quadriga.shared.topics import SAMPLE_MS
@@ -21,23 +27,6 @@ _SHARE: Final = 1.5
 _MARGIN: Final = 1.0  # N
 FADED: Final = "faded"  # status of a plan that is applied in part
 FARTHEST: Final = 10.0  # m, m/s, rad, rad/s: no trunk gets there, whatever is predicted
-
-
-@record
-class ActivePlan:
-    """One plan on its way: N samples from `plan_tick` on, in force from `start` on.
-
-    Attributes:
-        start: tick from which it is applied.
-        plan_tick: tick of its first sample.
-        deviation: force deviations from nominal, (N, 12), N.
-        outputs: outputs to follow, (N, 6): the planned ones, or in part those asked for.
-    """
-
-    start: int
-    plan_tick: int
-    deviation: Array
-    outputs: Array
 
 
 @record
@@ -92,6 +81,45 @@ class PlanCheck:
         u, nominal = plan.deviation, self.nominal(plan.plan_tick)
         u = nominal + u if np.shape(u) == nominal.shape else u
         return self._find_fault(now, plan.plan_tick, u, plan.outputs)
+
+    def admit(
+        self, outputs: PlanningOutputs, inputs: PlanningInputs, plans: tuple[ActivePlan, ...]
+    ) -> tuple[PlanningOutputs, tuple[ActivePlan, ...]]:
+        """What a step of planning gave, and the plans in force with it.
+
+        In the place of a plan that cannot be meant come nominal forces and the desired outputs,
+        with a status that names the planner and the fault. A robot that does not walk has none.
+
+        Args:
+            outputs: of the planner.
+            inputs: of the same step.
+            plans: in force before.
+        """
+        plan, active, fault = outputs.plan, outputs.active, ""
+        if plan is not None:
+            fault = self.fault_of(plan, inputs.tick)
+        if active is not None:
+            fault = fault or self.fault_of_active(active, inputs.tick)
+        if fault:
+            outputs = self._refuse(outputs, inputs, fault)
+        plans = plans if inputs.mode.name == WALK else ()
+        return outputs, plans if outputs.active is None else add_plan(plans, outputs.active)
+
+    def _refuse(
+        self, outputs: PlanningOutputs, inputs: PlanningInputs, fault: str
+    ) -> PlanningOutputs:
+        """Nominal forces from now on, published if the planner's plan was to be."""
+        kind, step = self._config.planner.kind, inputs.tick // self._step_ms
+        tick, plan = step * self._step_ms, outputs.plan
+        u, height = self.nominal(tick), self._config.reference.height
+        reference, _ = reference_at(inputs.references, inputs.tick, height)
+        y = np.tile(commanded_outputs(reference), (len(u), 1))
+        if plan is not None:
+            status = with_detail(NOMINAL, f"plan of {kind} refused: {fault}")
+            plan = Plan(tick, tick * 1_000_000, step, u, y, status, plan.used, plan.exchange)
+        active = ActivePlan(inputs.tick, tick, np.zeros_like(u), y)
+        unusual = (*outputs.unusual, f"refused_plan_of_{kind}")
+        return replace(outputs, plan=plan, active=active, unusual=unusual)
 
     def _find_fault(self, now: int, plan_tick: int, u: Any, y: Any) -> str:
         """Of forces u, (N, 12), N, and outputs y, (N, 6). It has no figures, which would vary."""

@@ -7,9 +7,9 @@ from dataclasses import field
 from typing import Final, Protocol, TypeVar
 
 from quadriga.agents.planner.solver import SolvedQp
-from quadriga.agents.planning.active_plan import ActivePlan
 from quadriga.shared.messages import Measurement, Plan, Reference
 from quadriga.shared.modes import Mode
+from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.record import record
 
 S = TypeVar("S")
@@ -34,6 +34,23 @@ class PlanningInputs:
     measurement: Measurement | None = None
     measurements: tuple[tuple[str, Measurement], ...] = ()
     plans: tuple[tuple[str, Plan], ...] = ()
+
+
+@record
+class ActivePlan:
+    """One plan on its way: N samples from `plan_tick` on, in force from `start` on.
+
+    Attributes:
+        start: tick from which it is applied.
+        plan_tick: tick of its first sample.
+        deviation: force deviations from nominal, (N, 12), N.
+        outputs: outputs to follow, (N, 6): the planned ones, or in part those asked for.
+    """
+
+    start: int
+    plan_tick: int
+    deviation: Array
+    outputs: Array
 
 
 @record

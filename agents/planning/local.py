@@ -11,10 +11,11 @@ from quadriga.agents.planner.cooperation import brings_forward, coupled_peers
 from quadriga.agents.planner.peers import Neighbours, PeerMemory, Peers, PeerTerms
 from quadriga.agents.planner.planner import Planner, PlannerInputs, PlannerState
 from quadriga.agents.planner.solver import SOLVED, SolvedQp
-from quadriga.agents.planning.active_plan import FADED, ActivePlan, trust_scaling
+from quadriga.agents.planning.active_plan import FADED, trust_scaling
 from quadriga.agents.planning.interface import (
     NOTHING,
     REFUSED,
+    ActivePlan,
     Expected,
     PlanningInputs,
     PlanningOutputs,
@@ -38,14 +39,12 @@ class LocalState:
     Attributes:
         peers: the peers' messages.
         own: the agent's last samples, T_ini of them.
-        terms: what the peers will do, for the planning step `terms.step`.
         inputs: what the plan of the present step was made of.
         planner: what the planner remembers.
     """
 
     peers: PeerMemory
     own: tuple[Measurement, ...] = ()
-    terms: PeerTerms = field(default_factory=PeerTerms)
     inputs: PlannerInputs | None = None
     planner: PlannerState = field(default_factory=PlannerState)
 
@@ -140,41 +139,30 @@ class LocalPlanning:
         if inputs.mode.name != WALK:
             return state, None, unusual
         step, exchange, off = self._place(inputs.tick)
-        exchanges = self._config.planner.exchanges
         if off == exchange == 0 and step >= self._first_step:
             if is_gapless(state.own, self._config.planner.T_ini, inputs.tick):
-                terms = self._next_terms(state, step, inputs)
+                end = step if brings_forward(self._config) else step - 1
+                terms = self._terms(state, step, inputs, last=step - 1, end=end)
                 now = build_planner_inputs(
                     self._config, step, inputs.tick, state.own, inputs.references
                 )
-                state = replace(state, terms=terms, inputs=now)
-                return state, ((step, 0), now, terms), unusual
+                return replace(state, inputs=now), ((step, 0), now, terms), unusual
             unusual = (WINDOW_GAP, *unusual)
-        complete = self._neighbours.is_complete
-        if off == 0 and 1 <= exchange <= exchanges:  # skipped if some of the peers' are late
-            past = state.inputs
-            if past is None or past.step != step or not complete(state.peers, (step, exchange - 1)):
-                return state, None, unusual
-            terms = self._terms(state, step, inputs, last=step, end=step)
-            return state, ((step, exchange), past, terms), unusual
-        if (inputs.plans or inputs.measurements) and complete(state.peers, (step, exchanges)):
-            # All that the coming step needs of the peers is there: off the critical path.
-            state = replace(state, terms=self._next_terms(state, step + 1, inputs))
+        past = state.inputs
+        if off == 0 and 1 <= exchange <= self._config.planner.exchanges and past is not None:
+            # Skipped if some of the peers' are late.
+            asked = step, exchange - 1
+            if past.step == step and self._neighbours.is_complete(state.peers, asked):
+                terms = self._terms(state, step, inputs, last=step, end=step)
+                return state, ((step, exchange), past, terms), unusual
         return state, None, unusual
-
-    def _next_terms(self, state: LocalState, step: int, inputs: PlanningInputs) -> PeerTerms:
-        """The peers' terms of a planning step, made of what they sent up to the step before."""
-        if state.terms.step == step:
-            return state.terms
-        end = step if brings_forward(self._config) else step - 1
-        return self._terms(state, step, inputs, last=step - 1, end=end)
 
     def _terms(
         self, state: LocalState, step: int, inputs: PlanningInputs, *, last: int, end: int
     ) -> PeerTerms:
         """Of what peers sent up to the step `last`, with windows that end at the step `end`."""
         first = max(self._first_step, -(-inputs.mode.since // self._step_ms))
-        peers = self._neighbours.select(state.peers, last, first, window_step=end)
+        peers = self._neighbours.select(state.peers, last, first, end)
         # The base of samples to come is the command of `last`, whenever this is computed.
         now = last * self._step_ms
         base = base_of_window(self._config, end * self._step_ms, inputs.references, now)

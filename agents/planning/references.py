@@ -49,9 +49,6 @@ def base_of_window(config: Config, end: int, references: tuple[Reference, ...], 
     """
     height, begin = config.reference.height, end - SAMPLE_MS * (config.planner.T_ini - 1)
     ticks = [min(tick, now) for tick in range(begin, end + 1, SAMPLE_MS)]
-    first, last = (reference_at(references, tick, height)[0] for tick in (ticks[0], ticks[-1]))
-    if first is last:  # as nearly always
-        return np.tile(output_base(config, last), (len(ticks), 1))
     return np.array([output_base(config, reference_at(references, t, height)[0]) for t in ticks])
 
 

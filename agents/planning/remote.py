@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 from quadriga.agents.gait import first_due_step, first_step, patience, step_ms
-from quadriga.agents.planning.active_plan import FADED, ActivePlan, PlanCheck, trust_scaling
+from quadriga.agents.planning.active_plan import FADED, PlanCheck, trust_scaling
 from quadriga.agents.planning.interface import (
     NOTHING,
     REFUSED,
+    ActivePlan,
     Expected,
     PlanningInputs,
     PlanningInterface,

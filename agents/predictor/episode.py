@@ -167,12 +167,10 @@ def as_signal(name: str, values: ArrayLike) -> Array:
     if np.ma.is_masked(values):
         cause = "split the data into episodes there"
         raise PredictorError(name, "masked samples", "numbers", cause)
-    if np.iscomplexobj(values):
-        raise PredictorError(name, "complex numbers", "real numbers")
     try:
-        array = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        raise PredictorError(name, "something else", "an array of numbers") from None
+        array = np.asarray(values).astype(np.float64, casting="same_kind")
+    except (TypeError, ValueError):
+        raise PredictorError(name, "something else", "an array of real numbers") from None
     if not (np.abs(array) <= _MOST).all():  # nor is NaN
         got = "NaN, infinity or too large numbers"
         raise PredictorError(name, got, f"finite numbers up to {_MOST:g}", "samples were lost?")

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from itertools import product
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -77,49 +78,44 @@ class GateReport:
         Raises:
             PredictorError: a figure is beyond its limit; the message names both.
         """
-        if not self.error < 1.0:
-            raise PredictorError(
-                "predictor: held-out error",
-                f"{self.error:.3f} of persistence",
-                "below 1",
-                "too little data, or a plant that the data do not show; collect more",
-            )
+        for is_within, name, got, expected, cause in self._limits(config):
+            if not is_within:
+                raise PredictorError(f"predictor: {name}", got, expected, cause)
+
+    def _limits(self, config: Config) -> Iterator[tuple[bool, str, str, str, str]]:
+        """Whether a figure is within its limit, its name, itself, the limit, why it may not be."""
+        cause = "too little data, or a plant that the data do not show; collect more"
+        got = f"{self.error:.3f} of persistence"
+        yield self.error < 1.0, "held-out error", got, "below 1", cause
         limits = config.identification
         low, high = limits.gain_range
+        expected = f"{low:g} … {high:g} of the physical response"
+        cause = (
+            "forces in the data that follow the outputs (feedback bias), or a controller stiffer "
+            "than the interface assumes"
+        )
         for robot, row in enumerate(self.gains, start=1):
             for time, gain in zip(GAIN_TIMES, row, strict=True):
-                if not low <= gain <= high:
-                    raise PredictorError(
-                        f"predictor: height gain of r{robot} at {time:g} s",
-                        f"{gain:.2f}",
-                        f"{low:g} … {high:g} of the physical response",
-                        "forces in the data that follow the outputs (feedback bias), "
-                        "or a controller stiffer than the interface assumes",
-                    )
+                name = f"height gain of r{robot} at {time:g} s"
+                yield low <= gain <= high, name, f"{gain:.2f}", expected, cause
         if not find_kind(config.planner.kind).needs_peers:
             return
-        if not self.radius < radius_limit(config):
-            name, remedy = "cooperative", "leave planner.damping at 0, which chooses it"
-            if not is_cooperative(config):
-                name = "best-response"
-                remedy = (
-                    "damp them by planner.damping, plan with planner.cost = 'team', or, of a ridge "
-                    "fit, raise identification.block_weight"
-                )
-            raise PredictorError(
-                f"predictor: radius of the {name} map",
-                f"{self.radius:.3f}",
-                f"below {radius_limit(config):g}",
-                f"the agents' plans would diverge; {remedy}",
+        kind, remedy = "cooperative", "leave planner.damping at 0, which chooses it"
+        if not is_cooperative(config):
+            kind, remedy = (
+                "best-response",
+                "damp them by planner.damping, plan with planner.cost = ",
             )
+            remedy += "'team', or, of a ridge fit, raise identification.block_weight"
+        limit, cause = radius_limit(config), f"the agents' plans would diverge; {remedy}"
+        name, got = f"radius of the {kind} map", f"{self.radius:.3f}"
+        yield self.radius < limit, name, got, f"below {limit:g}", cause
+        expected = f"certainly at most {100 * limits.max_peers_harm:g} %"
+        cause = "invented from noise: more data, or a larger identification.block_weight"
         for output, harm in self.harm.items():
-            if harm.low > limits.max_peers_harm:
-                raise PredictorError(
-                    f"predictor: effect of peers on {output}",
-                    f"{100 * harm.value:.0f} % more squared error on held-out data than without it",
-                    f"certainly at most {100 * limits.max_peers_harm:g} %",
-                    "invented from noise: more data, or a larger identification.block_weight",
-                )
+            got = f"{100 * harm.value:.0f} % more squared error on held-out data than without it"
+            within = not harm.low > limits.max_peers_harm
+            yield within, f"effect of peers on {output}", got, expected, cause
 
 
 @dataclass(frozen=True, slots=True)
@@ -378,19 +374,11 @@ def physical_height(config: Config, N: int) -> Array:
 
 def coupling_table(predictor: Predictor) -> Array:
     """Frobenius norms of the blocks G_ij of the scaled predictor, largest phase. Shape (n, n)."""
-    agents, (z_scale, y_scale) = range(predictor.layout.agents), predictor.layout.scales()
-    table: Array = np.array(
-        [
-            [
-                max(
-                    np.linalg.norm(predictor.block(i, j, phase) * z_scale / y_scale[:, None])
-                    for phase in range(predictor.phases)
-                )
-                for j in agents
-            ]
-            for i in agents
-        ]
-    )
+    n, (z_scale, y_scale) = predictor.layout.agents, predictor.layout.scales()
+    table = np.zeros((n, n))
+    for phase, i, j in product(range(predictor.phases), range(n), range(n)):
+        scaled = predictor.block(i, j, phase) * z_scale / y_scale[:, None]
+        table[i, j] = max(table[i, j], np.linalg.norm(scaled))
     return table
 
 

@@ -8,7 +8,9 @@ nominal inputs (`fit_free`).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import operator
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from itertools import product
@@ -27,6 +29,7 @@ FACTORS: Final = ("response", "free", "wrench")  # arrays of a periodic predicto
 DEGREE: Final = 3  # of the polynomials of the phase in a response
 FREE_ORDER: Final = 1  # harmonics of the map from the past
 FOLDS: Final = 10
+_ROWS: Final = 2048  # rows held in memory at a time; of draws, which are shorter, twice as many
 _LEAST_FOLDS: Final = 3
 _ROUNDING: Final = 1e-6  # rad: an angle this much before a half begins is meant to be its begin
 _SAME: Final = 1e-9  # inputs of an agent that differ by less are held
@@ -36,19 +39,18 @@ _PAST: Final = 6  # samples before a pulse that explain what would have happened
 _MEAN_ORDER: Final = 5  # harmonics of the mean walk
 _COMMANDS: Final = 5  # places of the horizon at which the commanded outputs are looked at
 _RIDGE: Final = 1e-3  # per row, of all regressors
-_ROWS: Final = 4096  # rows held in memory at a time
 _SMOOTH: Final = 0.01  # weight of a bend over the lags against the response itself
 _SIGNIFICANT: Final = 3.0  # standard errors
 _SMALLEST: Final = 0.08  # of the own response: a smaller one of a peer is left out
 
 # Of what follows from the past.
-_HELD_OUT: Final = 0.2  # of the rows, to choose the penalties by
-_FREE_ROWS: Final = 2048  # rows held in memory at a time
+_HELD_OUT: Final = 2  # folds, to choose the penalties by
 _WORTH: Final = 0.98  # of the error without peers: what that with them must be below
-# Candidate penalties per row: on everything, times this on harmonics, times this on peers.
+# Candidate penalties per row: on everything, times this on harmonics, times this on peers, beside
+# those without peers.
 _RIDGES: Final = (1e-3, 1e-2, 1e-1)
 _ON_HARMONICS: Final = (1.0, 10.0)
-_ON_PEERS: Final = (np.inf, 1.0, 30.0)  # infinite: left out
+_ON_PEERS: Final = (1.0, 30.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,23 +151,6 @@ class PeriodicFactors:
         """The factors, by name."""
         return {name: getattr(self, name) for name in FACTORS}
 
-    def check(self, layout: Layout) -> None:
-        """Refuse factors of another team or plant.
-
-        Raises:
-            PredictorError: it names the first array whose shape does not fit.
-        """
-        n, N, w = layout.agents, layout.N, len(self.wrench)
-        ends = {
-            "response": (N, n, w, n, layout.outputs),
-            "free": (n, n, layout.rows, (w + layout.outputs) * layout.T_ini),
-            "wrench": (layout.inputs,),
-        }
-        for name, end in ends.items():
-            shape = getattr(self, name).shape
-            if shape[1:] != end:
-                raise PredictorError(f"predictor.{name}", f"shape {shape}", f"(…, {end})")
-
     def block(self, i: int, j: int, phase: int, phases: int) -> Array:
         """G_ij of one of `phases` equal parts of the period. Shape (p N, (m + p) T_ini + m N)."""
         free, components = self.free[:, i, j], len(self.wrench)
@@ -210,7 +195,7 @@ def fit_periodic(
         PredictorError: too little data, or a singular problem.
     """
     check_episodes(episodes, layout)
-    hold = held_samples([episode.deviations()[0] for episode in episodes])
+    hold = _held_samples([episode.deviations()[0] for episode in episodes])
     walks = [_see(episode, layout, period, wrench, hold) for episode in episodes]
     h = estimate_response(walks, hold, layout, period.angle_step) if response is None else response
     free = fit_free(walks, h, layout)
@@ -234,12 +219,9 @@ class _Walk(NamedTuple):
     starts: Index  # samples with which a new draw of the inputs' noise begins; none without noise
 
 
-def held_samples(inputs: Sequence[Array]) -> int:
+def _held_samples(inputs: Sequence[Array]) -> int:
     """For how many samples the inputs (T, n, m) are held, everywhere in the data: 1 or more."""
-    held = 0
-    for u in inputs:
-        held = int(np.gcd.reduce(np.append(np.diff(_changes(u)), held)))
-    return max(1, held)
+    return max(1, int(np.gcd.reduce(np.concatenate([np.diff(_changes(u)) for u in inputs]))))
 
 
 def _see(episode: Episode, layout: Layout, period: Period, wrench: Array, hold: int) -> _Walk:
@@ -276,20 +258,30 @@ def _forced(walk: _Walk, at: Index, degree: int) -> Array:
     return (values[:, :, None] * w[:, None, :]).reshape(len(at), -1)
 
 
-def _chunks(
-    walks: Sequence[_Walk], first: int, ahead: int, size: int, *, starts: bool
-) -> Iterator[tuple[_Walk, Index]]:
-    """Samples with `first` samples before them and `ahead` from them on, at most `size` at a time.
+class _Rows(NamedTuple):
+    """Samples of a walk that are rows of a regression, few enough to be held in memory at once."""
 
-    With `starts` only samples with which a new draw of the noise begins.
+    walk: _Walk
+    at: Index
+    fold: int  # which of `FOLDS` parts of all walks, one after the other in time, they begin in
+
+
+def _rows(walks: Sequence[_Walk], first: int, ahead: int, *, starts: bool) -> list[_Rows]:
+    """Samples with `first` samples before them and `ahead` from them on.
+
+    With `starts` only those with which a new draw of the noise begins, each fold by itself.
     """
+    usable = []
     for walk in walks:
-        last = len(walk.w) - ahead
-        at = np.arange(first, last + 1)
-        if starts:
-            at = walk.starts[(walk.starts >= first) & (walk.starts <= last)]
+        at = walk.starts if starts else np.arange(len(walk.w))
+        usable.append(at[(at >= first) & (at <= len(walk.w) - ahead)])
+    total, seen, rows = sum(map(len, usable)), 0, list[_Rows]()
+    size = max(1, min(2 * _ROWS, -(-total // FOLDS))) if starts else _ROWS
+    for walk, at in zip(walks, usable, strict=True):
         for begin in range(0, len(at), size):
-            yield walk, at[begin : begin + size]
+            rows.append(_Rows(walk, at[begin : begin + size], seen * FOLDS // total))
+            seen += len(rows[-1].at)
+    return rows
 
 
 class _Sums(NamedTuple):
@@ -304,14 +296,9 @@ class _Sums(NamedTuple):
     third: Array
     rows: int
 
-    def plus(self, other: _Sums, sign: float = 1.0) -> _Sums:
-        """Of the rows of both; with −1.0 without those of the other."""
-        return _Sums(
-            self.zz + sign * other.zz,
-            self.zy + sign * other.zy,
-            self.third + sign * other.third,
-            self.rows + int(sign) * other.rows,
-        )
+
+def _total(parts: Sequence[_Sums]) -> _Sums:
+    return _Sums(*(reduce(operator.add, each) for each in zip(*parts, strict=True)))
 
 
 # ---- responses: one regression for each lag
@@ -333,34 +320,30 @@ def estimate_response(
     Raises:
         PredictorError: too little data.
     """
-    n = layout.agents
-    folds = _sum_folds(walks, layout.N, hold)
+    n, rows = layout.agents, _rows(walks, _PAST, layout.N, starts=True)
+    folds = _fold(rows, layout.N, hold)
     if len(folds) < _LEAST_FOLDS:
         raise PredictorError(
             "data for the periodic predictor",
-            f"{sum(fold.rows for fold in folds)} draws of the inputs' noise",
+            f"{sum(len(part.at) for part in rows)} draws of the inputs' noise",
             "enough to be divided",
             "collect more: identification.seconds",
         )
-    total = reduce(_Sums.plus, folds)
-    without = np.stack([_solve_lags(total.plus(fold, -1.0), n, hold) for fold in folds])
-    response = shrink(_solve_lags(total, n, hold), without)
+    total = _total(folds)
+    without = [_Sums(*map(operator.sub, total, fold)) for fold in folds]
+    estimates = np.stack([_solve_lags(sums, n, hold) for sums in without])
+    response = shrink(_solve_lags(total, n, hold), estimates)
     for i, members in enumerate(layout.members):
         response[:, :, [j for j in range(n) if j not in members], :, i] = 0.0
     return spread_over_samples(response, hold, angle_step)
 
 
-def _sum_folds(walks: Sequence[_Walk], N: int, hold: int) -> list[_Sums]:
-    """Sums of the regression over `FOLDS` parts of the walks, one after the other in time."""
-    total = sum(len(at) for _, at in _chunks(walks, _PAST, N, _ROWS, starts=True))
-    size = max(1, min(_ROWS, -(-total // FOLDS)))
-    folds: dict[int, _Sums] = {}
-    seen = 0
-    for walk, at in _chunks(walks, _PAST, N, size, starts=True):
-        fold, part = min(FOLDS - 1, seen * FOLDS // total), _sum_response_rows(walk, at, N, hold)
-        folds[fold] = folds[fold].plus(part) if fold in folds else part
-        seen += len(at)
-    return [*folds.values()]
+def _fold(rows: Sequence[_Rows], N: int, hold: int) -> list[_Sums]:
+    """Sums of the regression over `FOLDS` parts of the rows, one after the other in time."""
+    folds: defaultdict[int, list[_Sums]] = defaultdict(list)
+    for walk, at, fold in rows:
+        folds[fold].append(_sum_response_rows(walk, at, N, hold))
+    return [_total(parts) for parts in folds.values()]
 
 
 def _sum_response_rows(walk: _Walk, at: Index, N: int, hold: int) -> _Sums:
@@ -472,49 +455,43 @@ def shrink(estimate: Array, without: Array) -> Array:
 
 def fit_free(walks: Sequence[_Walk], h: Array, layout: Layout) -> Array:
     """The map as harmonics. Shape (2 FREE_ORDER + 1, n responding, n, p N, (w + p) T_ini)."""
-    train, rest = _sum_free_parts(walks, h, layout.T_ini)
-    both = train.plus(rest)
+    train, rest = list[_Sums](), list[_Sums]()
+    for walk, at, fold in _rows(walks, layout.T_ini, layout.N, starts=False):
+        part = rest if fold >= FOLDS - _HELD_OUT else train
+        part.append(_sum_free_rows(walk, at, h, layout.T_ini))
+    sums = [_total(part) for part in (train, rest) if part]
     waves, (_, N, n, w, _, p) = 2 * FREE_ORDER + 1, h.shape
     width = (w + p) * layout.T_ini
     wave, agent, _ = np.indices((waves, n, width)).reshape(3, -1)
     x = np.zeros((n, p, waves * n * width, N))
     for i, members in enumerate(layout.members):
-        columns = np.flatnonzero(np.isin(agent, members))
-        own, harmonic = agent[columns] == i, wave[columns] > 0
-        candidates = [
-            ridge * np.where(harmonic, on_harmonics, 1.0) * np.where(own, 1.0, on_peers)
-            for on_peers, ridge, on_harmonics in product(
-                _ON_PEERS[:1] if own.all() else _ON_PEERS, _RIDGES, _ON_HARMONICS
-            )
-        ]
-        best = _choose_penalties(train, rest, i, candidates, columns)
-        for k in np.unique(best):
-            outputs = np.flatnonzero(best == k)
-            solution = _solve_free(both, i, candidates[k], columns, outputs)
-            for place, output in enumerate(outputs):
-                x[i, output, columns] = solution[:, :, place]
+        own, every = np.flatnonzero(agent == i), np.flatnonzero(np.isin(agent, members))
+        with_peers = [(every, on_peers) for on_peers in _ON_PEERS if len(members) > 1]
+        candidates = []
+        for columns, on_peers in ((own, 1.0), *with_peers):
+            scale = np.where(agent[columns] == i, 1.0, on_peers)
+            for ridge, on_harmonics in product(_RIDGES, _ON_HARMONICS):
+                penalty = ridge * np.where(wave[columns] > 0, on_harmonics, 1.0) * scale
+                candidates.append((columns, penalty))
+        best = np.zeros(p, dtype=np.int64)
+        if len(sums) == 2:
+            best = _choose_penalties(sums[0], sums[1], i, candidates)
+        for k in np.unique(best).tolist():
+            solution = _solve_free(_total(sums), i, *candidates[k])
+            for output in np.flatnonzero(best == k).tolist():
+                x[i, output, candidates[k][0]] = solution[:, :, output]
     blocks = x.reshape(n, p, waves, n, width, N).transpose(2, 0, 3, 5, 1, 4)
     return blocks.reshape(waves, n, n, N * p, width)
 
 
-def _sum_free_parts(walks: Sequence[_Walk], h: Array, T_ini: int) -> tuple[_Sums, _Sums]:
-    """Sums over the first part of the rows and over the last."""
-    _, N, n, w, _, p = h.shape
-    K = (2 * FREE_ORDER + 1) * n * (w + p) * T_ini
-    total = sum(len(at) for _, at in _chunks(walks, T_ini, N, _FREE_ROWS, starts=False))
-    parts = [_Sums(np.zeros((K, K)), np.zeros((K, N, n, p)), np.zeros((n, p)), 0)] * 2
-    seen = 0
-    for walk, at in _chunks(walks, T_ini, N, _FREE_ROWS, starts=False):
-        past, waves = _past_rows(walk, at, T_ini), harmonics(walk.angle[at], FREE_ORDER)
-        z = (waves[:, :, None] * past[:, None, :]).reshape(len(at), -1)
-        y = np.stack([walk.y[at + lag].reshape(len(at), -1) for lag in range(N)], axis=1)
-        y = (y - _forced_outputs(walk, at, h)).reshape(len(at), -1)
-        yy = (y**2).sum(axis=0).reshape(N, n, p).sum(axis=0)
-        here = _Sums(z.T @ z, (z.T @ y).reshape(K, N, n, p), yy, len(at))
-        part = int(seen >= (1.0 - _HELD_OUT) * total)
-        parts[part] = parts[part].plus(here)
-        seen += len(at)
-    return parts[0], parts[1]
+def _sum_free_rows(walk: _Walk, at: Index, h: Array, T_ini: int) -> _Sums:
+    _, N, n, _, _, p = h.shape
+    past, waves = _past_rows(walk, at, T_ini), harmonics(walk.angle[at], FREE_ORDER)
+    z = (waves[:, :, None] * past[:, None, :]).reshape(len(at), -1)
+    y = np.stack([walk.y[at + lag].reshape(len(at), -1) for lag in range(N)], axis=1)
+    y = (y - _forced_outputs(walk, at, h)).reshape(len(at), -1)
+    yy = (y**2).sum(axis=0).reshape(N, n, p).sum(axis=0)
+    return _Sums(z.T @ z, (z.T @ y).reshape(z.shape[1], N, n, p), yy, len(at))
 
 
 def _forced_outputs(walk: _Walk, at: Index, h: Array) -> Array:
@@ -530,19 +507,16 @@ def _forced_outputs(walk: _Walk, at: Index, h: Array) -> Array:
 
 
 def _choose_penalties(
-    train: _Sums, rest: _Sums, i: int, candidates: list[Array], columns: Index
+    train: _Sums, rest: _Sums, i: int, candidates: Sequence[tuple[Index, Array]]
 ) -> Index:
     """The best candidate for each of agent `i`'s outputs.
 
     Peers count only where they lower the error by more than chance does.
     """
-    every = np.arange(train.zy.shape[3])
-    if not (train.rows and rest.rows):
-        return np.zeros_like(every)
-    zz, zy = rest.zz[np.ix_(columns, columns)], rest.zy[columns, :, i]
     errors = []
-    for penalty in candidates:
-        x = _solve_free(train, i, penalty, columns, every)
+    for columns, penalty in candidates:
+        x = _solve_free(train, i, columns, penalty)
+        zz, zy = rest.zz[np.ix_(columns, columns)], rest.zy[columns, :, i]
         squares = (np.tensordot(zz, x, axes=1) - 2.0 * zy) * x
         errors.append(rest.third[i] + squares.sum(axis=(0, 1)))
     table, alone = np.array(errors), len(_RIDGES) * len(_ON_HARMONICS)
@@ -551,14 +525,10 @@ def _choose_penalties(
     return best
 
 
-def _solve_free(sums: _Sums, i: int, penalty: Array, columns: Index, outputs: Index) -> Array:
-    """Solution for some outputs of agent `i`. Shape (len(columns), N, len(outputs))."""
-    counted = np.isfinite(penalty)
-    some = columns[counted]
-    A = sums.zz[np.ix_(some, some)].copy(order="F")
-    A.flat[:: len(A) + 1] += penalty[counted] * sums.rows
-    b = sums.zy[some][:, :, i, outputs]
-    solution = linalg.cho_solve((factorise(A), True), b.reshape(len(some), -1), check_finite=False)
-    x = np.zeros((len(columns), *b.shape[1:]))
-    x[counted] = solution.reshape(b.shape)
-    return x
+def _solve_free(sums: _Sums, i: int, columns: Index, penalty: Array) -> Array:
+    """Solution for the outputs of agent `i`. Shape (len(columns), N, p)."""
+    A, b = sums.zz[np.ix_(columns, columns)].copy(order="F"), sums.zy[columns, :, i]
+    A.flat[:: len(A) + 1] += penalty * sums.rows
+    factor = factorise(A), True
+    x: Array = linalg.cho_solve(factor, b.reshape(len(columns), -1), check_finite=False)
+    return x.reshape(b.shape)

@@ -129,16 +129,6 @@ class PredictorMeta:
             return Period(self.phases)
         return Period(2 * self.stance_ms, self.stand_ms, SAMPLE_MS)
 
-    @property
-    def width(self) -> int:
-        """Columns of a block: length of one agent's [u_ini; y_ini; u]."""
-        return self.layout.width
-
-    @property
-    def past(self) -> int:
-        """Columns of a block that belong to [u_ini; y_ini]."""
-        return self.layout.past
-
 
 def as_tuples(value: Any) -> Any:
     """A value of JSON with tuples for its lists, however deep they are."""
@@ -164,17 +154,23 @@ class Predictor:
     parts: Array | PeriodicFactors
 
     def __post_init__(self) -> None:
-        parts, n = self.parts, self.meta.robots
-        agents = (parts.free if isinstance(parts, PeriodicFactors) else parts).shape[1:2]
+        arrays, n = self.arrays(), self.meta.robots
+        agents = arrays["free" if "free" in arrays else "G"].shape[1:2]
         if agents != (n,):  # before the layout: a file may claim any number
             raise PredictorError("predictor", f"arrays of {agents} agents", f"{n}")
-        layout = self.layout
-        expected = (self.phases, layout.agents, layout.agents, layout.rows, layout.width)
-        if isinstance(parts, PeriodicFactors):
-            parts.check(layout)
-        elif parts.shape != expected:
-            raise PredictorError("predictor.G", f"shape {parts.shape}", f"{expected}")
-        for array in self.arrays().values():
+        layout, w = self.layout, len(arrays.get("wrench", ()))
+        n = layout.agents
+        expected = {
+            "G": (n, n, layout.rows, layout.width),
+            "response": (layout.N, n, w, n, layout.outputs),
+            "free": (n, n, layout.rows, (w + layout.outputs) * layout.T_ini),
+            "wrench": (layout.inputs,),
+        }
+        for name, array in arrays.items():
+            first = self.phases if name == "G" else len(array)
+            if array.shape != (first, *expected[name]):
+                wanted = f"{(first, *expected[name])}"
+                raise PredictorError(f"predictor.{name}", f"shape {array.shape}", wanted)
             array.setflags(write=False)
 
     @property
@@ -207,10 +203,6 @@ class Predictor:
         if isinstance(self.parts, PeriodicFactors):
             return self.parts.future_block(i, j, phase, self.phases)
         return self.block(i, j, phase)[:, self.layout.past :]
-
-    def couples(self, i: int, j: int) -> bool:
-        """Whether anything that agent j does has an effect on agent i."""
-        return any(self.block(i, j, phase).any() for phase in range(self.phases))
 
     def arrays(self) -> Mapping[str, Array]:
         """What it is made of, by name: with the meta all that a file must hold."""

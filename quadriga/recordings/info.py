@@ -8,7 +8,6 @@ from quadriga.recordings.metadata import read_counts, recorded_patterns, recorde
 from quadriga.recordings.survey import Survey, type_of
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import departures
-from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.recording.metadata import END
 from quadriga.shared.recording.quota import describe_refused
 from quadriga.shared.recording.ticks import TickTrack
@@ -69,9 +68,7 @@ def _about(s: Survey) -> Iterator[tuple[str, str]]:
             f"{c.world.scenario or c.world.terrain}, "
             f"seed {c.world.seed}",
         )
-        planner = find_kind(c.planner.kind)
-        absent = "" if planner.build else f" (not installed here: {planner.title})"
-        yield "planner", planner.name + absent
+        yield "planner", c.planner.kind
         if c.team.agent_command:
             yield "controller", s.metadata.get("controller", c.team.agent_command)
     yield "falls", ", ".join(e.robot for e in s.events if e.kind == "fall") or "none"

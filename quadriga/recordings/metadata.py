@@ -13,8 +13,7 @@ from typing import Any, Final
 from quadriga.shared.agent_command import command_origin
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.write import config_sha256
-from quadriga.shared.planner_kinds import describe_plugin, installed_kinds, plugin_origin
-from quadriga.shared.recording.config import PLUGIN
+from quadriga.shared.planner_kinds import installed_kinds, plugin_origin
 from quadriga.shared.recording.metadata import COUNTS
 from quadriga.shared.runtime.installed import package_versions
 
@@ -28,7 +27,6 @@ def build_metadata(config: Config, predictor_sha256: str) -> dict[str, str]:
         ConfigError: the file of a controller of one's own cannot be read.
     """
     origin = command_origin(config.team.agent_command)
-    plugin = describe_plugin(config.planner.kind)
     return {
         "team": config.team.name,
         "scenario": config.world.scenario,
@@ -37,7 +35,6 @@ def build_metadata(config: Config, predictor_sha256: str) -> dict[str, str]:
         "predictor_sha256": predictor_sha256,
         "versions": json.dumps(installed_versions(config.planner.kind)),
         **({"controller": origin} if origin else {}),
-        **({PLUGIN: plugin} if plugin else {}),
     }
 
 

@@ -132,8 +132,8 @@ def _save_planner(qp: SolvedQp, about: str) -> SavedQp:
         qp.problem.H,
         qp.f,
         qp.problem.A,
-        np.maximum(qp.lower, -_FAR),
-        np.minimum(qp.upper, _FAR),
+        np.maximum(qp.problem.lower, -_FAR),
+        np.minimum(qp.problem.upper, _FAR),
         qp.solution.x,
         f"planner's QP of {about}, {qp.solution.status}: x is the force deviations of the "
         "stance legs over the horizon [N]",

@@ -10,29 +10,27 @@ from typing import Final
 from quadriga.shared.config.load import build, flatten
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError, RecordingError
-from quadriga.shared.planner_kinds import stand_in
 from quadriga.shared.printable import printable_line
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.robots.registry import ROBOTS
 
-PLUGIN: Final = "planner"  # in the metadata: what is to be known of a plug-in's kind of planner
 _OTHER_VERSION: Final = "recorded by another version of quadriga: use that one"
 
 
 def recorded_config(recording: Recording) -> Config:
     """The configuration of a recorded run.
 
-    A recording holds every key, so that no default of today stands for one of then. A planner, or a
-    robot, of a package that is not installed keeps its name: messages can be read without it, and
-    whatever needs more of it raises ConfigError (`Config.robot`, `planner_kinds.load_builder`).
+    A recording holds every key, so that no default of today stands for one of then. A robot of a
+    package that is not installed keeps its name: messages can be read without it, and whatever
+    needs more of it raises ConfigError (`Config.robot`).
 
     Raises:
         RecordingError: the recording holds none, or one with keys or values that this version
-            does not know.
+            does not know, or of a planner that is not installed.
     """
     found = recording.metadata
     try:
-        config = _build(found.get("config_json", ""), found.get(PLUGIN, ""))
+        config = _build(found.get("config_json", ""))
     except ConfigError as error:
         raise RecordingError(
             f"configuration of {recording.path}",
@@ -47,7 +45,7 @@ def recorded_config(recording: Recording) -> Config:
 
 
 @lru_cache(maxsize=8)  # every reader of a recording asks, and a configuration does not change
-def _build(text: str, plugin: str) -> Config | None:
+def _build(text: str) -> Config | None:
     """The configuration; None if the text is no table of sections."""
     try:
         sections = json.loads(text)
@@ -59,7 +57,6 @@ def _build(text: str, plugin: str) -> Config | None:
     for name in flatten(asdict(Config())):
         if name not in keys:
             raise ConfigError(name, "no value", "a value of every key")
-    stand_in(str(keys["planner.kind"]), plugin)
     team, robot = sections.get("team"), keys.get("team.robot")
     if isinstance(team, dict) and isinstance(robot, str) and robot not in ROBOTS:
         config = build({**sections, "team": {k: v for k, v in team.items() if k != "robot"}})

@@ -8,6 +8,13 @@ from typing import Any
 import numpy as np
 
 from quadriga.agents.agent import Agent, AgentState, Inputs, Outputs
+from quadriga.agents.planning.active_plan import PlanCheck, Setpoint, setpoint_at
+from quadriga.agents.planning.interface import (
+    ActivePlan,
+    PlanningInputs,
+    PlanningInterface,
+    PlanningOutputs,
+)
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.codec import decode, encode
@@ -28,14 +35,23 @@ def simple_predictor(config: Config) -> Predictor:
         effect[1, 3 * leg] = effect[2, 3 * leg + 1] = 8e-4  # m/s per N and sample
     forget = np.exp(-0.2)
     fading = np.array([[forget ** (k - j) if k >= j else 0.0 for j in range(N)] for k in range(N)])
-    G = np.zeros((meta.robots, meta.robots, N_OUTPUTS * N, meta.width))
-    last = meta.past - N_OUTPUTS  # column of the newest output in [u_ini; y_ini]
+    G = np.zeros((meta.robots, meta.robots, N_OUTPUTS * N, meta.layout.width))
+    last = meta.layout.past - N_OUTPUTS  # column of the newest output in [u_ini; y_ini]
     assert last == N_FORCES * T_ini + N_OUTPUTS * (T_ini - 1)
     for robot in range(meta.robots):
         fade = forget ** np.arange(1.0, N + 1.0)
-        G[robot, robot, :, last : meta.past] = np.kron(fade[:, None], np.eye(N_OUTPUTS))
-        G[robot, robot, :, meta.past :] = np.kron(fading, effect)
+        G[robot, robot, :, last : meta.layout.past] = np.kron(fade[:, None], np.eye(N_OUTPUTS))
+        G[robot, robot, :, meta.layout.past :] = np.kron(fading, effect)
     return Predictor(meta, G[None])
+
+
+def coupled(config: Config, strength: float = 0.3) -> Predictor:
+    """What a robot does to itself it does to its peer as well, more weakly."""
+    alone = simple_predictor(config)
+    G, past = alone.G.copy(), alone.layout.past
+    for i in range(2):
+        G[:, i, 1 - i, :, past:] = strength * G[:, i, i, :, past:]
+    return Predictor(alone.meta, G)
 
 
 def asked(vx: float = 0.3) -> Reference:
@@ -85,6 +101,22 @@ def record(rollout: Rollout, ticks: int) -> dict[str, list[Step]]:
     for _ in rollout.ticks(ticks):
         pass
     return {name: listener.steps for name, listener in listeners.items()}
+
+
+class Planned:
+    """An agent's planning with the plans that are in force, as its agent has them."""
+
+    def __init__(self, config: Config, index: int, planning: PlanningInterface[Any]) -> None:
+        self.planning, self._check = planning, PlanCheck(config, index)
+        self.state, self.plans = planning.initial(), tuple[ActivePlan, ...]()
+
+    def step(self, inputs: PlanningInputs) -> PlanningOutputs:
+        self.state, outputs = self.planning.step(self.state, inputs)
+        outputs, self.plans = self._check.admit(outputs, inputs, self.plans)
+        return outputs
+
+    def applied(self, tick: int) -> Setpoint:
+        return setpoint_at(self.plans, tick)
 
 
 def fingerprint(value: Any) -> Any:

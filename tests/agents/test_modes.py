@@ -267,6 +267,6 @@ def test_a_pair_that_had_lost_each_other_walks_and_plans_on_together() -> None:
     assert all(o.reason.startswith("peer-lost") for o in found[3499].values())
     assert {name: o.mode for name, o in found[3500].items()} == {"r1": WALK, "r2": WALK}
     assert {o.mode for o in found[4999].values()} == {WALK}
-    used = {name: state.planning.planner.planner.step for name, state in rollout.states.items()}
+    used = {name: state.planning.planner.step for name, state in rollout.states.items()}
     assert set(used.values()) == {4960 // 40}
     assert not rollout.world.fallen()

@@ -111,7 +111,7 @@ def chance(random: np.random.Generator) -> int:
 def predictors(folder: Path) -> Archives:
     """Predictors of robots."""
     meta = PredictorMeta.of(load(None, SMALL))
-    predictor = Predictor(meta, np.zeros((1, 1, 1, 6 * meta.N, meta.width)))
+    predictor = Predictor(meta, np.zeros((1, 1, 1, 6 * meta.N, meta.layout.width)))
 
     def write(path: Path) -> None:
         save(path, predictor, asdict(Provenance("abc", (1,), (900,), (100,), {}, REPORT)))

@@ -91,12 +91,11 @@ def test_the_documented_commands_know_it(place: Place, said: dict[str, str]) -> 
 @pytest.mark.usefixtures("said")
 def test_without_the_package_a_recording_says_what_is_missing(place: Place) -> None:
     recording = str(place.folder / "runs" / "balance" / "run.mcap")
-    assert run_command("check", recording)[0] == 0
-    status, errors = run_command("replay", recording, "--all")
-    assert status == 2
-    missing = "planner.kind: got 'balance', expected an installed kind (install quadriga-balance"
-    assert missing in errors
-    assert "install quadriga-balance 0.1.0" in errors
+    for words in (("check",), ("replay", "--all")):
+        status, errors = run_command(*words, recording)
+        assert status == 2
+        assert "planner.kind = 'balance'" in errors
+        assert "install the package that has it" in errors
 
 
 def test_its_options_are_checked(place: Place) -> None:
@@ -111,8 +110,8 @@ def test_it_keeps_the_contract_of_all_planners(place: Place) -> None:
     options = ("-vv", "-p", "no:cacheprovider", "-p", "no:xdist", "-k", "balance", "--rootdir")
     done = place.run(sys.executable, "-m", "pytest", *options, str(TOP), test)
     assert done.returncode == 0, done.stdout
-    assert re.search(r"test_a_replay_is_exact\[balance\] PASSED", done.stdout)
-    assert len(re.findall(r"balance\] PASSED", done.stdout)) >= 8
+    assert re.search(r"test_a_replay_is_exact\[0-balance\] PASSED", done.stdout)
+    assert len(re.findall(r"balance\] PASSED", done.stdout)) >= 7
 
 
 @pytest.mark.nightly

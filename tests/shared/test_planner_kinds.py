@@ -49,8 +49,6 @@ def test_a_plugin_is_a_kind_like_any_other(tmp_path: Path, monkeypatch: pytest.M
         "import no_such_library",
         "KIND = 3",
         "from quadriga.shared.planner_kinds import BUILT_IN\nKIND = BUILT_IN['none']",
-        "from quadriga.shared.planner_kinds import PlannerKind\n"
-        "KIND = PlannerKind('lame', 't', 'a:b', build_team='a:c', needs_peers=True)",
     ],
 )
 def test_a_plugin_that_cannot_be_used_names_its_distribution(

@@ -84,11 +84,11 @@ def predict_responses(responses: Responses, predictor: Predictor, gait: GaitConf
     phases, n, directions, N, _ = responses.u.shape
     predicted = np.empty((phases, n, directions, N, n, N_OUTPUTS))
     for p, tick in enumerate(responses.ticks.tolist()):
-        z = np.zeros((n, meta.width, n, directions))
+        z = np.zeros((n, meta.layout.width, n, directions))
         for j in range(n):
-            z[j, meta.past :, j] = responses.u[p, j].reshape(directions, N * N_FORCES).T
+            z[j, meta.layout.past :, j] = responses.u[p, j].reshape(directions, N * N_FORCES).T
         phase = gait_phase(tick, gait.stand_ms, gait.stance_ms, predictor.phases)
-        y = predictor.predict(z.reshape(n, meta.width, -1), phase)
+        y = predictor.predict(z.reshape(n, meta.layout.width, -1), phase)
         y = y.reshape(n, N, N_OUTPUTS, n, directions)
         predicted[p] = y.transpose(3, 4, 1, 0, 2)
     return predicted

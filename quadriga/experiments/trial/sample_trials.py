@@ -123,11 +123,11 @@ def sample_predictor(config: Config) -> Predictor:
             np.full(N_FORCES * N, 1.0 / U_SCALE),
         ]
     )
-    G = 0.01 * random.normal(size=(meta.phases, n, n, N_OUTPUTS * N, meta.width))
+    G = 0.01 * random.normal(size=(meta.phases, n, n, N_OUTPUTS * N, meta.layout.width))
     G *= np.tile(Y_SCALE, N)[:, None] * per_column
-    last = meta.past - N_OUTPUTS
+    last = meta.layout.past - N_OUTPUTS
     for i in range(n):
-        G[:, i, i, :, last : meta.past] += np.tile(np.eye(N_OUTPUTS), (N, 1))
+        G[:, i, i, :, last : meta.layout.past] += np.tile(np.eye(N_OUTPUTS), (N, 1))
     return Predictor(meta, G)
 
 

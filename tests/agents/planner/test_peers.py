@@ -78,7 +78,7 @@ def remember(step: int, plans: list[int], ticks: list[int], robot: str = "r2") -
 
 
 def of(memory: PeerMemory, step: int, robot: str = "r2") -> PeerData:
-    peers = NEIGHBOURS.select(memory, step - 1, FIRST)
+    peers = NEIGHBOURS.select(memory, step - 1, FIRST, step - 1)
     return next(peer for peer in peers if peer.robot == robot)
 
 
@@ -95,27 +95,9 @@ def expected_du(step: int, age: int) -> Array:
     return np.tile(shifted[:, None], (1, 12))
 
 
-@pytest.mark.parametrize(
-    ("age", "status"), [(0, USABLE), (1, USABLE), (2, USABLE), (3, SILENT), (5, SILENT), (6, LOST)]
-)
-def test_a_missing_plan_is_replaced_by_the_newest_one_shifted_then_the_peer_is_silent_then_lost(
-    age: int, status: str
-) -> None:
-    newest = 19 - age
-    memory = remember(newest, [newest - 1, newest], [])
-    memory = NEIGHBOURS.remember(memory, 40 * 20, [("r2", measurement("r2", 760))], [])
-    peer = of(memory, 20)
-    assert (peer.status, peer.step, peer.age) == (status, newest, age)
-    if status == USABLE:
-        np.testing.assert_allclose(peer.du, expected_du(20, age), atol=1e-9)
-    terms = PeerTerms(peers=NEIGHBOURS.select(memory, 19, FIRST))
-    assert terms.lost == NEIGHBOURS.lost_peers(memory, 19, FIRST)
-    assert ("r2" in terms.lost) == (status == LOST)
-
-
 def test_the_first_planning_step_needs_nobodys_plan() -> None:
     memory = remember(FIRST, [], window_ticks(FIRST))
-    peers = NEIGHBOURS.select(memory, FIRST - 1, FIRST)
+    peers = NEIGHBOURS.select(memory, FIRST - 1, FIRST, FIRST - 1)
     assert PeerTerms(peers=peers).used == {}
     assert [peer.status for peer in peers] == [USABLE, USABLE]
     assert all((peer.du == 0).all() for peer in peers)
@@ -123,10 +105,14 @@ def test_the_first_planning_step_needs_nobodys_plan() -> None:
     assert not peers[1].known.any()
 
 
-def test_a_peer_that_never_plans_is_lost_in_the_end() -> None:
-    memory = NEIGHBOURS.initial()
-    seen = [of(memory, step).status for step in range(FIRST, FIRST + 7)]
-    assert seen == [USABLE] * 3 + [SILENT] * 3 + [LOST]
+def test_a_peer_that_plans_no_more_is_silent_and_then_lost() -> None:
+    """Whether it ever planned or not."""
+    for memory, first in ((NEIGHBOURS.initial(), FIRST), (remember(15, [15], []), 16)):
+        steps = range(first, first + 7)
+        seen = [of(memory, step).status for step in steps]
+        assert seen == [USABLE] * 3 + [SILENT] * 3 + [LOST]
+        lost = ["r2" in NEIGHBOURS.lost_peers(memory, step - 1, FIRST) for step in steps]
+        assert lost == [False] * 6 + [True]
 
 
 @pytest.mark.parametrize(
@@ -232,6 +218,7 @@ def test_loss_repetition_and_reordering(
     age = step - 1 - newest
     limits = (PLANNER.max_peer_age, PLANNER.max_peer_age + PLANNER.hold_steps)
     assert peer.status == (USABLE, SILENT, LOST)[sum(age > limit for limit in limits)]
+    assert ("r2" in NEIGHBOURS.lost_peers(memory, step - 1, FIRST)) == (peer.status == LOST)
     if peer.status != USABLE:
         return
     assert peer.step == (newest if usable else None)
@@ -255,7 +242,7 @@ def test_loss_repetition_and_reordering(
 
 def test_brought_forward_the_window_ends_now_and_its_end_is_what_the_peer_planned() -> None:
     memory = remember(20, [18, 19, 20], list(range(10, 810, 10)))
-    peer = NEIGHBOURS.select(memory, 19, FIRST, window_step=20)[0]
+    peer = NEIGHBOURS.select(memory, 19, FIRST, 20)[0]
     assert (peer.status, peer.step, peer.age) == (USABLE, 19, 0)
     # Samples after the step that may be looked at come from its plan, measured or not.
     expected = [mark("r2", 750), mark("r2", 760), *(told(19, k) for k in range(4))]
@@ -292,6 +279,6 @@ def test_complete_means_every_peer_s_plan_and_the_samples_before_it() -> None:
 
 def test_plans_of_before_a_stop_do_not_count() -> None:
     memory = remember(20, [12, 13], window_ticks(20))
-    peer = NEIGHBOURS.select(memory, 19, 20)[0]
+    peer = NEIGHBOURS.select(memory, 19, 20, 19)[0]
     assert (peer.status, peer.step, peer.age) == (USABLE, None, 0)
     assert not peer.du.any()

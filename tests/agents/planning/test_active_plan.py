@@ -8,13 +8,8 @@ import numpy as np
 import pytest
 
 from quadriga.agents.gait import horizon_stance, nominal_forces
-from quadriga.agents.planning.active_plan import (
-    FARTHEST,
-    ActivePlan,
-    PlanCheck,
-    add_plan,
-    setpoint_at,
-)
+from quadriga.agents.planning.active_plan import FARTHEST, PlanCheck, add_plan, setpoint_at
+from quadriga.agents.planning.interface import ActivePlan
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError

@@ -10,25 +10,13 @@ import pytest
 from quadriga.agents.planner.peers import PeerData, Peers
 from quadriga.agents.planning.interface import Expected
 from quadriga.agents.planning.local import LocalPlanning
-from quadriga.agents.predictor.predictor import Predictor
 from quadriga.identification.rollout import Rollout
-from quadriga.shared.config.sections import Config
 from quadriga.shared.robots.conventions import Array
-from tests.agents.duet import CONFIG, FIRST_PLAN, every_100_ms, record, simple_predictor
+from tests.agents.duet import CONFIG, FIRST_PLAN, coupled, every_100_ms, record
 
 ANSWERS = 2
 ANSWERING = replace(CONFIG, planner=replace(CONFIG.planner, exchanges=ANSWERS))
 GAP = 10  # ms: a quarter of the step for K = 2
-
-
-def coupled(config: Config, strength: float = 0.3) -> Predictor:
-    """What a robot does to itself it does to its peer as well, more weakly."""
-    alone = simple_predictor(config)
-    G = alone.G.copy()
-    past = alone.meta.past
-    for i in range(2):
-        G[:, i, 1 - i, :, past:] = strength * G[:, i, i, :, past:]
-    return Predictor(alone.meta, G)
 
 
 def test_every_step_has_its_plan_and_its_answers_each_with_what_it_used() -> None:

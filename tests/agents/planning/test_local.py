@@ -10,17 +10,15 @@ import numpy as np
 import pytest
 
 from quadriga.agents.gait import scheduled_stance
-from quadriga.agents.planning.active_plan import Setpoint, setpoint_at
 from quadriga.agents.planning.interface import PlanningInputs, PlanningOutputs
 from quadriga.agents.planning.local import LocalPlanning
-from quadriga.agents.planning.registry import CheckedPlanning
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config, PlannerConfig, TeamConfig
 from quadriga.shared.messages import Measurement, Plan
 from quadriga.shared.modes import STAND, STOPPING, WALK, Mode
 from quadriga.shared.robots.conventions import Array
 from tests.a1 import nominal_forces
-from tests.agents.duet import asked, simple_predictor
+from tests.agents.duet import Planned, asked, coupled, simple_predictor
 
 ALONE = Config(team=TeamConfig(robots=1), planner=PlannerConfig(latency_ms=0))
 REFERENCE = asked(0.3)
@@ -30,34 +28,20 @@ FIRST = 320
 
 
 @cache
-def planning_of(config: Config) -> CheckedPlanning:
-    return planning_with(config, simple_predictor(config))
+def planning_of(config: Config) -> LocalPlanning:
+    return LocalPlanning(config, 0, simple_predictor(config), lambda: 0)
 
 
-def planning_with(config: Config, predictor: Predictor) -> CheckedPlanning:
-    return CheckedPlanning(config, 0, LocalPlanning(config, 0, predictor, lambda: 0))
-
-
-@cache
-def coupled(config: Config) -> Predictor:
-    """What a peer does moves the other as well."""
-    alone = simple_predictor(config)
-    G = alone.G.copy()
-    G[:, 0, 1] = 0.3 * G[:, 1, 1]
-    return Predictor(alone.meta, G)
-
-
-class Walker:
+class Walker(Planned):
     """One robot's planning with samples of our own making."""
 
     def __init__(self, config: Config = ALONE, predictor: Predictor | None = None) -> None:
-        self.config = config
-        self.planning = (
-            planning_of(config) if predictor is None else planning_with(config, predictor)
-        )
-        self.state = self.planning.initial()
+        self.config, planning = config, planning_of(config)
+        if predictor is not None:
+            planning = LocalPlanning(config, 0, predictor, lambda: 0)
+        super().__init__(config, 0, planning)
 
-    def step(
+    def sample(
         self,
         tick: int,
         y: Array = ON_COURSE,
@@ -70,17 +54,12 @@ class Walker:
             u = nominal_forces(stance)
             measurement = Measurement(tick, tick * 1_000_000, u, y, stance.astype(float))
         mode = mode or (WALKING if tick >= 300 else Mode(STAND, 0))
-        arrived = PlanningInputs(tick, mode, (REFERENCE,), measurement, plans=plans)
-        self.state, outputs = self.planning.step(self.state, arrived)
-        return outputs
-
-    def applied(self, tick: int = FIRST) -> Setpoint:
-        return setpoint_at(self.state.plans, tick)
+        return self.step(PlanningInputs(tick, mode, (REFERENCE,), measurement, plans=plans))
 
     def walk(self, until: int, y: Array = ON_COURSE) -> PlanningOutputs:
         """All samples up to and including the tick `until`."""
         for tick in range(10, until + 1, 10):
-            outputs = self.step(tick, y)
+            outputs = self.sample(tick, y)
         return outputs
 
 
@@ -92,7 +71,7 @@ def test_off_course_the_plan_pushes_back_and_is_handed_on_sample_by_sample() -> 
     nominal = nominal_forces(scheduled_stance(ALONE, 0, FIRST + 10 * np.arange(25)))
     assert (plan.u - nominal)[:4, 0].min() > 1.0
     for tick in range(FIRST + 1, FIRST + 40):
-        outputs = walker.step(tick, slow)
+        outputs = walker.sample(tick, slow)
         assert outputs.plan is None
         sample = (tick - FIRST) // 10
         deviation = walker.applied(tick).deviation
@@ -104,11 +83,11 @@ def test_a_plan_that_is_not_renewed_runs_out() -> None:
     slow = ON_COURSE - np.array([0.0, 0.1, 0.0, 0.0, 0.0, 0.0])
     walker = Walker()
     walker.walk(FIRST, slow)
-    state, end = walker.state, FIRST + 10 * ALONE.planner.N
+    end = FIRST + 10 * ALONE.planner.N
     for tick, expected in ((end - 1, True), (end + 1, False), (end + 1001, False)):
-        after, outputs = walker.planning.step(state, PlanningInputs(tick, WALKING, (REFERENCE,)))
+        outputs = walker.step(PlanningInputs(tick, WALKING, (REFERENCE,)))
         assert outputs.plan is None
-        assert bool(setpoint_at(after.plans, tick).deviation.any()) == expected
+        assert bool(walker.applied(tick).deviation.any()) == expected
 
 
 @pytest.mark.parametrize("missing", [FIRST - 30, FIRST - 80, FIRST])
@@ -116,23 +95,12 @@ def test_without_a_whole_window_of_own_samples_nothing_is_planned(missing: int) 
     walker = Walker()
     for tick in range(10, FIRST + 1, 10):
         if tick != missing:
-            outputs = walker.step(tick, mode=WALKING)
+            outputs = walker.sample(tick, mode=WALKING)
     if missing == FIRST:
-        _, outputs = walker.planning.step(
-            walker.state, PlanningInputs(FIRST, WALKING, (REFERENCE,))
-        )
+        outputs = walker.step(PlanningInputs(FIRST, WALKING, (REFERENCE,)))
     assert outputs.plan is None
     assert outputs.planner_ns is None
     assert outputs.unusual == ("window_gap",)
-
-
-def test_a_message_from_another_time_is_counted() -> None:
-    pair = replace(ALONE, team=TeamConfig(robots=2))
-    stray = Measurement(10_000, 0, np.zeros(12), ON_COURSE, np.ones(4))
-    planning = planning_of(pair)
-    arrived = PlanningInputs(400, WALKING, (REFERENCE,), measurements=(("r2", stray),))
-    _, outputs = planning.step(planning.initial(), arrived)
-    assert outputs.unusual.count("refused_by_planner") == 1
 
 
 @pytest.mark.parametrize("mode", [Mode(STAND, 0), Mode(STOPPING, 300, "why")])
@@ -140,7 +108,7 @@ def test_nothing_is_planned_and_nothing_handed_on_unless_walking(mode: Mode) -> 
     slow = ON_COURSE - np.array([0.0, 0.1, 0.0, 0.0, 0.0, 0.0])
     walker = Walker()
     walker.walk(FIRST, slow)
-    outputs = walker.step(FIRST + 40, slow, mode)
+    outputs = walker.sample(FIRST + 40, slow, mode)
     assert outputs.plan is None
     assert not walker.applied(FIRST + 40).deviation.any()
 
@@ -162,9 +130,9 @@ def test_a_plan_fades_out_beyond_the_range_of_the_data(
     full, faded = sure.walk(FIRST, y), wary.walk(FIRST, y)
     assert full.plan is not None
     assert faded.plan is not None
-    whole = sure.applied().deviation
+    whole = sure.applied(FIRST).deviation
     assert np.abs(whole).max() > 1.0
-    np.testing.assert_allclose(wary.applied().deviation, share * whole, atol=1e-6)
+    np.testing.assert_allclose(wary.applied(FIRST).deviation, share * whole, atol=1e-6)
     assert faded.plan.status == ("solved" if share == 1.0 else "faded")
     nominal = nominal_forces(scheduled_stance(ALONE, 0, FIRST + 10 * np.arange(25)))
     np.testing.assert_allclose(faded.plan.u - nominal, share * (full.plan.u - nominal), atol=1e-6)
@@ -174,7 +142,7 @@ def test_a_plan_fades_out_beyond_the_range_of_the_data(
     np.testing.assert_allclose(full.plan.y - faded.plan.y, (1.0 - share) * effect, atol=1e-6)
     # Followed are the planned outputs, as far as the plan is applied, else those asked for.
     expected = ON_COURSE + share * (full.plan.y[0] - ON_COURSE)
-    y_ref = wary.applied().y_ref
+    y_ref = wary.applied(FIRST).y_ref
     assert y_ref is not None
     np.testing.assert_allclose(y_ref, expected, atol=1e-12)
 
@@ -188,7 +156,7 @@ def test_a_fallback_follows_the_speeds_asked_for() -> None:
     outputs = walker.walk(FIRST, y)
     assert outputs.plan is not None
     assert outputs.plan.status == "nominal:infeasible"
-    np.testing.assert_array_equal(walker.applied().y_ref, ON_COURSE)
+    np.testing.assert_array_equal(walker.applied(FIRST).y_ref, ON_COURSE)
     assert outputs.plan.y[0, 1] < 0.25  # nominal forces alone do not mend it at once
 
 
@@ -208,14 +176,14 @@ def test_a_plan_of_absurd_samples_is_nominal_by_name_and_follows_what_is_asked_f
     walker, broken = Walker(), ON_COURSE.copy()
     broken[1] = absurd
     for tick in range(10, FIRST + 1, 10):
-        outputs = walker.step(tick, broken if tick == FIRST - back else ON_COURSE)
+        outputs = walker.sample(tick, broken if tick == FIRST - back else ON_COURSE)
     assert outputs.plan is not None
     assert outputs.plan.status == f"nominal:{status}"
     nominal = nominal_forces(scheduled_stance(ALONE, 0, FIRST + 10 * np.arange(25)))
     np.testing.assert_array_equal(outputs.plan.u, nominal)
     np.testing.assert_array_equal(outputs.plan.y, np.tile(ON_COURSE, (25, 1)))
-    assert not walker.applied().deviation.any()
-    np.testing.assert_array_equal(walker.applied().y_ref, ON_COURSE)
+    assert not walker.applied(FIRST).deviation.any()
+    np.testing.assert_array_equal(walker.applied(FIRST).y_ref, ON_COURSE)
 
 
 @pytest.mark.parametrize(("name", "absurd"), [("u", 1e39), ("y", np.nan)])
@@ -229,7 +197,7 @@ def test_absurd_numbers_of_a_peer_do_not_enter_a_plan(name: str, absurd: float) 
         if tick == FIRST - 10:  # made of one's own, which any could be
             claim = replace(expected, tick=FIRST - 40, step=FIRST // 40 - 1)
             plans = (("r2", replace(claim, **{name: np.full_like(getattr(claim, name), absurd)})),)
-        outputs = walker.step(tick, plans=plans)
+        outputs = walker.sample(tick, plans=plans)
         assert outputs.unusual.count("refused_by_planner") == len(plans)
     assert outputs.plan is not None
     np.testing.assert_array_equal(outputs.plan.u, expected.u)
@@ -240,7 +208,7 @@ def test_the_first_plan_waits_for_the_window_when_the_stand_is_short() -> None:
     config = replace(ALONE, gait=replace(ALONE.gait, stand_ms=100))
     walker = Walker(config)
     outputs = [
-        tick for tick in range(10, 400, 10) if walker.step(tick, mode=WALKING).plan is not None
+        tick for tick in range(10, 400, 10) if walker.sample(tick, mode=WALKING).plan is not None
     ]
     assert outputs[0] == 160  # (10 + 4 samples) up to the next 40 ms
 
@@ -253,7 +221,7 @@ def stop_of(walker: Walker, ticks: range, missing: Callable[[int], bool]) -> tup
     for tick in ticks:
         if missing(tick):
             continue
-        outputs = walker.step(tick)
+        outputs = walker.sample(tick)
         if outputs.stop_reason:
             return tick, outputs.stop_reason
     return -1, ""
@@ -300,9 +268,9 @@ def test_a_silent_peer_is_given_up_in_time_whatever_its_own_samples_are(
 def test_who_begins_to_walk_late_has_time_to_fill_its_window(T_ini: int) -> None:
     walker = Walker(replace(ALONE, planner=replace(ALONE.planner, T_ini=T_ini)))
     ticks, late = range(5000, 5600, 10), Mode(WALK, 5000)
-    seen = [walker.step(tick, ON_COURSE, late) for tick in ticks]
+    seen = [walker.sample(tick, ON_COURSE, late) for tick in ticks]
     assert {outputs.stop_reason for outputs in seen} == {""}
     made = [tick for tick, outputs in zip(ticks, seen, strict=True) if outputs.plan is not None]
     assert made[0] == -(-(5000 + 10 * (T_ini - 1)) // 40) * 40
     lonely = Walker(replace(ALONE, team=TeamConfig(robots=2)))
-    assert {lonely.step(t, ON_COURSE, late).stop_reason for t in range(5000, 5080, 10)} == {""}
+    assert {lonely.sample(t, ON_COURSE, late).stop_reason for t in range(5000, 5080, 10)} == {""}

@@ -30,7 +30,7 @@ def agent_of(mode: str) -> tuple[Config, Agent]:
     """Robot r2 of three, with a predictor that predicts nothing."""
     config = load(None, {"team.robots": 3, "world.mode": mode, "gait.stand_ms": 100})
     meta = PredictorMeta.of(config)
-    nothing = Predictor(meta, np.zeros((1, 3, 3, 6 * meta.N, meta.width)))
+    nothing = Predictor(meta, np.zeros((1, 3, 3, 6 * meta.N, meta.layout.width)))
     return config, Agent(config, "r2", nothing)
 
 

@@ -54,7 +54,7 @@ def write(path: Path, config: Config, sha256: str = "", ticks: int = 5) -> Path:
 def fitted(path: Path, config: Config, scale: float = 0.0) -> str:
     """Write a predictor file; its digest."""
     meta = PredictorMeta.of(config)
-    G = np.full((1, 1, 1, 6 * meta.N, meta.width), scale)
+    G = np.full((1, 1, 1, 6 * meta.N, meta.layout.width), scale)
     return save(path, Predictor(meta, G))
 
 

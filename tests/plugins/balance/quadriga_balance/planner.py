@@ -3,8 +3,12 @@
 import numpy as np
 
 from quadriga.agents.gait import first_step, horizon_stance, nominal_forces, step_ms
-from quadriga.agents.planning.active_plan import ActivePlan
-from quadriga.agents.planning.interface import PlanningInputs, PlanningInterface, PlanningOutputs
+from quadriga.agents.planning.interface import (
+    ActivePlan,
+    PlanningInputs,
+    PlanningInterface,
+    PlanningOutputs,
+)
 from quadriga.agents.planning.references import reference_at
 from quadriga.agents.predictor.episode import commanded_outputs
 from quadriga.shared.messages import Plan

@@ -37,7 +37,7 @@ def predictor_of(config: Config, phases: int = 1, seed: int = 0) -> Predictor:
     meta = replace(PredictorMeta.of(config), phases=phases)
     n = config.team.robots
     random = np.random.default_rng(seed)
-    return Predictor(meta, random.normal(size=(phases, n, n, 6 * N, meta.width)))
+    return Predictor(meta, random.normal(size=(phases, n, n, 6 * N, meta.layout.width)))
 
 
 def truth_of(config: Config, predictor: Predictor) -> Responses:
