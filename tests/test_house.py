@@ -18,14 +18,14 @@ ROOTS: Final = (*WALLS, "quadriga", "benchmarks")
 # Lines of each package, of Python and of pages, docstrings and blanks included. Lowering one is
 # always right; raising one needs a reason beside it.
 BUDGETS: Final[Mapping[str, int]] = {
-    "agents": 9_699,  # planned: 8,000; left: cooperation, periodic fits, rigid body, validation
-    "plant": 1_104,  # planned: 1,000; left: states and commands over the bus
+    "agents": 9_508,  # planned: 8,000; left: cooperation, periodic fits, rigid body, validation
+    "plant": 1_102,  # planned: 1,000; left: states and commands over the bus
     "sim_server": 2_639,  # planned: 2,600
     "bridges": 1_904,
-    "shared": 8_663,  # planned: 7,200; left: Unitree's protocols, the barrier, 550 lines of keys
-    "quadriga": 39_735,  # planned: 18,200; left: harnesses of experiments, report, commands
+    "shared": 8_166,  # planned: 7,200; left: Unitree's protocols, the barrier, 550 lines of keys
+    "quadriga": 39_655,  # planned: 18,200; left: harnesses of experiments, report, commands
     "benchmarks": 4_300,  # planned: 1,800
-    "tests": 44_810,  # planned: 28,000
+    "tests": 44_570,  # planned: 28,000
 }
 COUNTED: Final = (".py", ".js", ".css", ".html")
 MOST_ARGUMENTS: Final = 8

@@ -10,7 +10,7 @@ import numpy as np
 
 from quadriga.agents.planner.peers import PeerData, Peers, PeerTerms
 from quadriga.agents.planner.planner import Planner, PlannerInputs, PlannerState, PlanResult
-from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
+from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robots.conventions import Array
 from tests.a1 import WEIGHT, nominal_forces
@@ -52,41 +52,6 @@ def inputs_of(config: Config, step: int = STEP, **changes: Any) -> PlannerInputs
         weight=WEIGHT,
     )
     return replace(calm, **changes)
-
-
-def disturbed(config: Config, seed: int, size: float = 1.0) -> list[PlannerInputs]:
-    """All robots of a team off their course in ways of their own."""
-    rng, T_ini, N = np.random.default_rng(seed), config.planner.T_ini, config.planner.N
-    scale = size * np.array([0.004, 0.1, 0.1, 0.02, 0.02, 0.1])
-    stands = nominal_forces(np.ones((T_ini, 4), dtype=np.bool_))
-    y_des = np.tile(BASE + 0.2 * scale * rng.normal(size=6), (N, 1))
-    return [
-        inputs_of(
-            config,
-            u_ini=stands + 5.0 * size * rng.normal(size=(T_ini, 12)),
-            y_ini=BASE + scale * rng.normal(size=(T_ini, 6)),
-            y_des=y_des,
-        )
-        for _ in range(config.team.robots)
-    ]
-
-
-def coupled(config: Config, seed: int, strength: float) -> Predictor:
-    """Any G of a plausible size whose blocks off the diagonal are `strength` times as large.
-
-    What a robot does to itself it does to others too, in part, so that the blocks are alike.
-    """
-    meta = PredictorMeta.of(config)
-    rng, n = np.random.default_rng(seed), meta.robots
-    shape = (meta.N, 6, meta.layout.width)
-    size = 1e-4 * np.array([1.0, 30.0, 30.0, 10.0, 10.0, 30.0])[:, None]
-    own = [rng.normal(size=shape) * size for _ in range(n)]
-    G = np.empty((1, n, n, 6 * meta.N, meta.layout.width))
-    for i in range(n):
-        for j in range(n):
-            mixed = own[j] if i == j else strength * (own[j] + 0.3 * rng.normal(size=shape) * size)
-            G[0, i, j] = mixed.reshape(6 * meta.N, meta.layout.width)
-    return Predictor(meta, G)
 
 
 def terms_of(

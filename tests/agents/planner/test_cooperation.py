@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -21,14 +22,14 @@ from quadriga.agents.planner.cooperation import (
 from quadriga.agents.planner.peers import PeerData, Peers
 from quadriga.agents.planner.planner import Planner, PlannerState
 from quadriga.agents.planner.team import build_centralised
-from quadriga.agents.predictor.gates import iteration_radius
+from quadriga.agents.predictor.gates import iteration_radius, radius_limit, run_gates
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
-from quadriga.shared.errors import ConfigError
+from quadriga.shared.errors import ConfigError, PredictorError
 from quadriga.shared.robots.conventions import Array
 from tests.a1 import nominal_forces
-from tests.agents.calm import STEP, Team, coupled, disturbed, inputs_of, peer, team_cost, terms_of
+from tests.agents.calm import BASE, STEP, Team, inputs_of, peer, team_cost, terms_of
 from tests.agents.conftest import fit_ridge
 
 ROUNDS = 200  # within which strongly coupled plans are as good as the central planner's
@@ -40,16 +41,46 @@ def cooperative(config: Config, robots: int = 3, **changes: Any) -> Config:
     return replace(config, team=replace(config.team, robots=robots), planner=planner)
 
 
+def coupled(config: Config, seed: int, strength: float) -> Predictor:
+    """Any G of a plausible size whose blocks off the diagonal are `strength` times as large.
+
+    What a robot does to itself it does to others too, in part, so that the blocks are alike.
+    """
+    meta = PredictorMeta.of(config)
+    rng, n = np.random.default_rng(seed), meta.robots
+    shape = (meta.N, 6, meta.layout.width)
+    size = 1e-4 * np.array([1.0, 30.0, 30.0, 10.0, 10.0, 30.0])[:, None]
+    own = [rng.normal(size=shape) * size for _ in range(n)]
+    G = np.empty((1, n, n, 6 * meta.N, meta.layout.width))
+    for i in range(n):
+        for j in range(n):
+            mixed = own[j] if i == j else strength * (own[j] + 0.3 * rng.normal(size=shape) * size)
+            G[0, i, j] = mixed.reshape(6 * meta.N, meta.layout.width)
+    return Predictor(meta, G)
+
+
 class Round:
     """A team whose windows stay as they are, and whose agents plan again and again."""
 
     def __init__(self, config: Config, predictor: Predictor, seed: int, size: float) -> None:
+        rng, planner = np.random.default_rng(seed), config.planner
+        scale = size * np.array([0.004, 0.1, 0.1, 0.02, 0.02, 0.1])
+        y_des = np.tile(BASE + 0.2 * scale * rng.normal(size=6), (planner.N, 1))
         self.config, self.predictor = config, predictor
-        self.inputs = disturbed(config, seed, size)
+        self.inputs = [
+            inputs_of(
+                config,
+                u_ini=nominal_forces(np.ones((planner.T_ini, 4), dtype=np.bool_))
+                + 5.0 * size * rng.normal(size=(planner.T_ini, 12)),
+                y_ini=BASE + scale * rng.normal(size=(planner.T_ini, 6)),
+                y_des=y_des,
+            )
+            for _ in range(config.team.robots)
+        ]
         self.planners = [Planner(config, i, predictor) for i in range(config.team.robots)]
         self.coupling = [Peers(config, i, predictor) for i in range(config.team.robots)]
         self.states = [PlannerState() for planner in self.planners]
-        self.du = np.zeros((config.team.robots, config.planner.N, 12))
+        self.du = np.zeros((config.team.robots, planner.N, 12))
 
     def plan(self) -> None:
         """Every agent plans with its peers' last plans."""
@@ -131,11 +162,16 @@ def test_strongly_coupled_plans_become_the_central_planner_s(
         rounds.plan()
     assert 0.0 <= rounds.cost(rounds.du) - lowest < 1e-3 * (first - lowest)
     np.testing.assert_allclose(rounds.du, best, atol=1.0)
-    if not bounded:
-        alone = Round(small_own(config), predictor, 7, size)
-        for _ in range(ROUNDS):
-            alone.plan()
-        assert alone.cost(alone.du) > 100.0 * lowest
+
+
+def test_best_responses_of_the_same_team_do_not(small: Config) -> None:
+    config = cooperative(small)
+    predictor = coupled(config, 5, 0.5)
+    rounds = Round(small_own(config), predictor, 7, 0.3)
+    lowest = rounds.cost(rounds.best())
+    for _ in range(ROUNDS):
+        rounds.plan()
+    assert rounds.cost(rounds.du) > 100.0 * lowest
 
 
 def test_the_slope_is_that_of_the_team_s_cost(small: Config, linear_team: Team) -> None:
@@ -200,6 +236,27 @@ def test_the_share_is_the_one_that_contracts_fastest(small: Config) -> None:
         assert cooperative_radius(cooperative(small, damping=other), predictor) > automatic
 
 
+def test_too_little_of_the_last_plan_is_refused(small: Config, linear_team: Team) -> None:
+    config = cooperative(small, damping=0.01)
+    plant = replace(config, controller=replace(config.controller, ki_z=0.0))
+    meta = replace(PredictorMeta.of(plant), ridge=1e-9, block_weight=1.0)
+    exact = fit_ridge([linear_team(3).episode(2500, 1)], meta)
+    alike = exact.G.copy()
+    for i in range(3):
+        for j in range(3):
+            alike[0, i, j, :, meta.layout.past :] = exact.G[0, j, j, :, meta.layout.past :]
+    wild = Predictor(exact.meta, alike)
+    assert cooperative_radius(plant, wild) > 1.0
+    report = replace(
+        run_gates(plant, exact, [linear_team(3).episode(200, 50)]),
+        radius=cooperative_radius(plant, wild),
+    )
+    assert radius_limit(plant) == 1.0
+    with pytest.raises(PredictorError, match=r"cooperative map.*below 1.*planner\.damping"):
+        report.check(plant)
+    assert cooperative_radius(cooperative(plant, damping=0.0), wild) < 1.0
+
+
 def small_own(config: Config) -> Config:
     return replace(config, planner=replace(config.planner, cost="own"))
 
@@ -222,6 +279,30 @@ def test_those_matter_who_reach_a_neighbour(small: Config) -> None:
     assert peers(config) == [[1, 2], [0, 2, 3], [0, 1, 3], [1, 2]]
     assert peers(small_own(config)) == [[1], [0, 2], [1, 3], [2]]
     assert peers(cooperative(small, robots=4, kind="decentralised")) == [[]] * 4
+
+
+def test_the_peers_terms_are_the_effect_of_their_plans_and_its_slope(
+    small: Config, linear_team: Callable[..., Any]
+) -> None:
+    config = cooperative(small)
+    meta = replace(PredictorMeta.of(config), ridge=1e-10, block_weight=1.0)
+    predictor = fit_ridge([linear_team(3).episode(2500, 1)], meta)
+    planner = Planner(config, 0, predictor)
+    base = np.tile(BASE, (small.planner.T_ini, 1))
+    stance = np.repeat(horizon_stance(config, 1, STEP), 3, axis=1)
+    pushing = np.where(stance, np.tile([20.0, 5.0, 0.0], (8, 4)), 0.0)
+    pair = peer(config, age=1, du=pushing), peer(config, robot="r3", index=2)
+    terms = Peers(config, 0, predictor).terms(pair, STEP, STEP, base)
+    z = np.zeros((3, predictor.meta.layout.width))
+    z[1, predictor.meta.layout.past :] = pushing.ravel()
+    effect = predictor.predict(z)
+    qp = planner.problem_of(PlannerState(), inputs_of(config), terms)
+    assert qp is not None
+    columns, Q = qp.problem.columns, np.tile(config.planner.Q, config.planner.N)
+    blocks = [predictor.future_block(j, 0)[:, columns] for j in range(3)]
+    slope = sum(block.T @ (Q * effect[j]) for j, block in enumerate(blocks))
+    np.testing.assert_allclose(terms.effect, effect[0], atol=1e-6 * np.abs(effect).max())
+    np.testing.assert_allclose(terms.slope, slope, rtol=1e-4, atol=1e-4)
 
 
 # ---- damping of best responses
@@ -252,7 +333,13 @@ def test_few_robots_are_damped_only_if_they_are_asked_to_be() -> None:
     found = {key: share(key[0], preset=key[1]) for key in shares}
     assert found == pytest.approx(shares)
     assert (share(10, damping=0.0), share(2, damping=0.3)) == (0.0, 0.3)
-    alone = "decentralised"  # who answers nobody
-    assert (share(5, kind=alone), share(3, kind=alone, damping=0.4)) == (0.0, 0.4)
     with pytest.raises(ConfigError, match=r"planner.damping: got -0.5, expected -1, or 0 … 0.95"):
         share(5, damping=-0.5)
+
+
+def test_who_answers_nobody_is_damped_only_if_it_is_asked_to() -> None:
+    kinds = ("distributed", "decentralised")
+    teams = [load(overrides={"team.robots": 5, "planner.kind": kind}) for kind in kinds]
+    assert [kept_share(team) for team in teams] == [pytest.approx(3 / 7), 0.0]
+    asked = load(overrides={"planner.kind": "decentralised", "planner.damping": 0.4})
+    assert kept_share(asked) == 0.4

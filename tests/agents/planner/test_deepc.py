@@ -8,19 +8,21 @@ from typing import Any
 
 import daqp
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from benchmarks.as_written import TIGHT, DeepcQp
 from quadriga.agents.gait import horizon_stance
-from quadriga.agents.planner.qp import Condensed, constrain
+from quadriga.agents.planner.qp import Condensed, PlannerProblem, constrain
 from quadriga.agents.planner.team import build_model, select
 from quadriga.agents.predictor.episode import U_SCALE, Y_SCALE, Episode, team_layout
 from quadriga.agents.predictor.hankel import hankel
 from quadriga.agents.predictor.regression import Reduction, reduce
 from quadriga.shared.config.sections import Config, PlannerConfig
 from quadriga.shared.robots.conventions import Array
-from tests.a1 import WEIGHT
+from tests.a1 import WEIGHT, nominal_forces
 
 Team = Callable[..., Any]
 T_INI, N = 2, 3
@@ -165,6 +167,20 @@ def test_without_active_bounds_it_is_the_saddle_point_of_equation_5(
     np.testing.assert_allclose(error, 0.0, atol=1e-6)
 
 
+def bounded(
+    case: Case, lambda_g: float, tightness: float
+) -> tuple[Condensed, PlannerProblem, PlannerConfig, Array]:
+    """A problem whose bounds matter: cost, limits, configuration, and the exact answer."""
+    condensed = reduced(case, PLANNER, lambda_g, 1e3)
+    f = condensed.F_past @ case.past + condensed.F_des @ case.y_des
+    free = np.abs(np.linalg.solve(condensed.H, f)).reshape(-1, 3)
+    planner = replace(PLANNER, mu=0.3, deviation_max=tuple(tightness * free.max(axis=0)))
+    problem = constrain(planner, WEIGHT, condensed, case.stance.reshape(-1, 4))
+    v, active = exact(condensed.H, f, problem.A, problem.lower, problem.upper)
+    assert active
+    return condensed, problem, planner, v
+
+
 def exact(H: Array, f: Array, A: Array, lower: Array, upper: Array) -> tuple[Array, int]:
     """The minimiser by a dense active-set method, and how many bounds are active."""
     x, _, flag, info = daqp.solve(
@@ -193,27 +209,36 @@ def test_with_active_bounds_it_is_equation_5(
 ) -> None:
     """With all of u, y, g, σ as unknowns, solved by the same exact method."""
     case = case_of(linear_team, 1, seed, noise, step)
-    condensed = reduced(case, PLANNER, lambda_g, 1e3)
-    f = condensed.F_past @ case.past + condensed.F_des @ case.y_des
-    free = np.abs(np.linalg.solve(condensed.H, f)).reshape(-1, 3)
-    planner = replace(PLANNER, mu=0.3, deviation_max=tuple(tightness * free.max(axis=0)))
-    problem = constrain(planner, WEIGHT, condensed, case.stance.reshape(-1, 4))
-    v, active = exact(condensed.H, f, problem.A, problem.lower, problem.upper)
-    assert active
+    condensed, problem, _, v = bounded(case, lambda_g, tightness)
     P, q, E, e = written_out(case, lambda_g, 1e3)
     rows, nv = np.zeros((len(problem.upper), len(q))), len(v)
     rows[:, case.columns] = np.vstack([np.eye(nv), problem.A])
-    anything = np.full(len(q), np.inf)
+    free = np.full(len(q), np.inf)
     x, _ = exact(
         P,
         q,
         np.vstack([rows, E]),
-        np.concatenate([-anything, problem.lower, e]),
-        np.concatenate([anything, problem.upper, e]),
+        np.concatenate([-free, problem.lower, e]),
+        np.concatenate([free, problem.upper, e]),
     )
     np.testing.assert_allclose(x[case.columns], v, atol=1e-6 * (1.0 + np.abs(v).max()))
     error = (outputs(condensed, case, v) - x[12 * N : 18 * N]).reshape(-1, 6) / Y_SCALE
     np.testing.assert_allclose(error, 0.0, atol=1e-6)
+
+
+@pytest.mark.parametrize(("n", "seed", "noise"), [(1, 1, 0.3), (1, 2, 0.0), (2, 3, 0.05)])
+def test_osqp_finds_the_same_when_it_is_tight(
+    linear_team: Team, n: int, seed: int, noise: float
+) -> None:
+    case = case_of(linear_team, n, seed, noise)
+    condensed, _, planner, v = bounded(case, 1e3, 0.4)
+    written = DeepcQp(planner, case.episodes, 1e3, 1e3, TIGHT).solve(
+        case.past, case.y_des, case.stance, nominal_forces(case.stance)
+    )
+    assert written.status == "solved"
+    np.testing.assert_allclose(written.u.ravel()[case.columns], v, atol=1e-3 * np.abs(v).max())
+    error = (written.y - outputs(condensed, case, v).reshape(written.y.shape)) / Y_SCALE
+    np.testing.assert_allclose(error, 0.0, atol=1e-4)
 
 
 def test_without_noise_it_predicts_the_true_response(linear_team: Team) -> None:

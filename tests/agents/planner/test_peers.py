@@ -95,6 +95,24 @@ def expected_du(step: int, age: int) -> Array:
     return np.tile(shifted[:, None], (1, 12))
 
 
+@pytest.mark.parametrize(
+    ("age", "status"), [(0, USABLE), (1, USABLE), (2, USABLE), (3, SILENT), (5, SILENT), (6, LOST)]
+)
+def test_a_missing_plan_is_replaced_by_the_newest_one_shifted_then_the_peer_is_silent_then_lost(
+    age: int, status: str
+) -> None:
+    newest = 19 - age
+    memory = remember(newest, [newest - 1, newest], [])
+    memory = NEIGHBOURS.remember(memory, 40 * 20, [("r2", measurement("r2", 760))], [])
+    peer = of(memory, 20)
+    assert (peer.status, peer.step, peer.age) == (status, newest, age)
+    if status == USABLE:
+        np.testing.assert_allclose(peer.du, expected_du(20, age), atol=1e-9)
+    terms = PeerTerms(peers=NEIGHBOURS.select(memory, 19, FIRST, 19))
+    assert terms.lost == NEIGHBOURS.lost_peers(memory, 19, FIRST)
+    assert ("r2" in terms.lost) == (status == LOST)
+
+
 def test_the_first_planning_step_needs_nobodys_plan() -> None:
     memory = remember(FIRST, [], window_ticks(FIRST))
     peers = NEIGHBOURS.select(memory, FIRST - 1, FIRST, FIRST - 1)
@@ -105,14 +123,10 @@ def test_the_first_planning_step_needs_nobodys_plan() -> None:
     assert not peers[1].known.any()
 
 
-def test_a_peer_that_plans_no_more_is_silent_and_then_lost() -> None:
-    """Whether it ever planned or not."""
-    for memory, first in ((NEIGHBOURS.initial(), FIRST), (remember(15, [15], []), 16)):
-        steps = range(first, first + 7)
-        seen = [of(memory, step).status for step in steps]
-        assert seen == [USABLE] * 3 + [SILENT] * 3 + [LOST]
-        lost = ["r2" in NEIGHBOURS.lost_peers(memory, step - 1, FIRST) for step in steps]
-        assert lost == [False] * 6 + [True]
+def test_a_peer_that_never_plans_is_lost_in_the_end() -> None:
+    memory = NEIGHBOURS.initial()
+    seen = [of(memory, step).status for step in range(FIRST, FIRST + 7)]
+    assert seen == [USABLE] * 3 + [SILENT] * 3 + [LOST]
 
 
 @pytest.mark.parametrize(
@@ -218,7 +232,6 @@ def test_loss_repetition_and_reordering(
     age = step - 1 - newest
     limits = (PLANNER.max_peer_age, PLANNER.max_peer_age + PLANNER.hold_steps)
     assert peer.status == (USABLE, SILENT, LOST)[sum(age > limit for limit in limits)]
-    assert ("r2" in NEIGHBOURS.lost_peers(memory, step - 1, FIRST)) == (peer.status == LOST)
     if peer.status != USABLE:
         return
     assert peer.step == (newest if usable else None)

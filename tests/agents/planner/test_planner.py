@@ -75,7 +75,7 @@ def test_the_qp_is_that_of_eq_12_written_out(
     solved = planner.problem_of(PlannerState(), inputs, terms)
     assert solved is not None
     _, result = planner.step(PlannerState(), inputs, terms)
-    G, past = predictor.block(0, 0), predictor.layout.past
+    G, past = predictor.block(0, 0), predictor.meta.layout.past
     y_free = G[:, :past] @ inputs.past() + terms.effect
     error = y_free - (inputs.y_des - inputs.y_base).ravel()
     weighted = G[:, past:][:, solved.problem.columns].T * np.tile(small.planner.Q, 8)
@@ -87,6 +87,43 @@ def test_the_qp_is_that_of_eq_12_written_out(
     np.testing.assert_allclose(result.y, inputs.y_base + dy, atol=1e-12)
     np.testing.assert_allclose(result.y_nominal, inputs.y_base + y_free.reshape(8, 6), atol=1e-12)
     assert result.residuals == solved.solution.residuals
+
+
+def test_swing_legs_carry_exactly_nothing(small: Config, predictor: Predictor) -> None:
+    wish = np.tile(BASE + 0.02, (8, 1))
+    for step in range(30):
+        result = plan(small, predictor, inputs_of(small, step=step, y_des=wish))
+        swing = ~horizon_stance(small, 0, step)
+        assert (result.u.reshape(8, 4, 3)[swing] == 0.0).all()
+
+
+def test_without_a_solution_the_plan_is_nominal(small: Config, predictor: Predictor) -> None:
+    bounds = replace(small.planner, force_min=50.0, deviation_max=(20.0, 20.0, 5.0))
+    impossible = replace(small, planner=bounds)
+    wish = np.tile(BASE + 0.02, (8, 1))
+    standing = plan(impossible, predictor, inputs_of(small, step=0, y_des=wish))
+    assert standing.status == "nominal:infeasible"
+    np.testing.assert_array_equal(standing.u, nominal_forces(horizon_stance(small, 0, 0)))
+    np.testing.assert_allclose(standing.y, np.tile(BASE, (8, 1)), atol=1e-9)
+    walking = plan(impossible, predictor, inputs_of(small, y_des=wish))
+    assert walking.status == "solved"
+
+
+def test_equal_inputs_give_equal_bits_whatever_came_before(
+    small: Config, predictor: Predictor
+) -> None:
+    rng = np.random.default_rng(5)
+    various = [
+        inputs_of(small, step=int(step), y_ini=BASE + 0.01 * rng.normal(size=(4, 6)))
+        for step in rng.integers(8, 28, 12)
+    ]
+    used = Planner(small, 0, predictor)
+    first = [used.step(PlannerState(), one, NOTHING)[1] for one in various]
+    for one, expected in reversed(list(zip(various, first, strict=True))):
+        for planner in (used, Planner(small, 0, predictor)):
+            again = planner.step(PlannerState(), one, NOTHING)[1]
+            assert again.u.tobytes() == expected.u.tobytes()
+            assert again.y.tobytes() == expected.y.tobytes()
 
 
 def test_a_predictor_of_another_size_is_refused(small: Config, predictor: Predictor) -> None:

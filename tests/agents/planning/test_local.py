@@ -274,3 +274,12 @@ def test_who_begins_to_walk_late_has_time_to_fill_its_window(T_ini: int) -> None
     assert made[0] == -(-(5000 + 10 * (T_ini - 1)) // 40) * 40
     lonely = Walker(replace(ALONE, team=TeamConfig(robots=2)))
     assert {lonely.sample(t, ON_COURSE, late).stop_reason for t in range(5000, 5080, 10)} == {""}
+
+
+def test_a_message_from_another_time_is_counted() -> None:
+    pair = replace(ALONE, team=TeamConfig(robots=2))
+    stray = Measurement(10_000, 0, np.zeros(12), ON_COURSE, np.ones(4))
+    planning = planning_of(pair)
+    arrived = PlanningInputs(400, WALKING, (REFERENCE,), measurements=(("r2", stray),))
+    _, outputs = planning.step(planning.initial(), arrived)
+    assert outputs.unusual.count("refused_by_planner") == 1

@@ -14,7 +14,7 @@ from quadriga.agents.planning.remote import RemotePlanning
 from quadriga.shared.config.sections import Config, PlannerConfig, TeamConfig
 from quadriga.shared.config.timing import max_ages
 from quadriga.shared.messages import Measurement, Plan
-from quadriga.shared.modes import WALK, Mode
+from quadriga.shared.modes import STAND, WALK, Mode
 from quadriga.shared.robots.conventions import Array
 from tests.a1 import nominal_forces
 from tests.agents.duet import Planned, asked
@@ -136,3 +136,9 @@ def test_without_plans_the_robot_stops_with_a_name_for_it() -> None:
     patience = planner.max_peer_age + planner.hold_steps
     assert next(step for step, why in reasons.items() if why) == 8 + patience + 1
     assert {*reasons.values()} == {"", "planner-lost"}
+
+
+def test_nothing_is_applied_unless_walking() -> None:
+    follower = Follower()
+    follower.follow(321, plan_of(8), mode=Mode(STAND, 0))
+    assert follower.force(321) == 0.0

@@ -10,15 +10,21 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy import integrate, optimize
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy import integrate, linalg, optimize
 
 from quadriga.agents.gait import horizon_stance
-from quadriga.agents.predictor.episode import Episode
+from quadriga.agents.planner import qp
+from quadriga.agents.planner.qp import Condensed
+from quadriga.agents.predictor.episode import Y_SCALE, Episode
 from quadriga.agents.predictor.gates import (
     Bounds,
     GateReport,
     Provenance,
     best_response_map,
+    coupling_table,
     height_gains,
     held_out_error,
     iteration_radius,
@@ -28,16 +34,17 @@ from quadriga.agents.predictor.gates import (
     run_gates,
 )
 from quadriga.agents.predictor.predictor import Predictor, PredictorMeta, fit_plant
-from quadriga.shared.config.sections import Config
+from quadriga.shared.config.sections import Config, PlannerConfig
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robots.conventions import OUTPUTS, Array
 from tests.a1 import TOTAL_MASS, build_problem
-from tests.agents.calm import coupled
 from tests.agents.conftest import fit_ridge
 from tests.agents.predictor.plants import Sizes, first_window, random_plant, record
 
 Team = Callable[..., Any]
 FINE = GateReport(0.5, ((1.0, 1.0), (1.0, 1.0)), 0.1)
+# The springs of the linear team act on these; its height, pitch and yaw rate know no peers.
+COUPLED = ("vx", "vy")
 
 
 @pytest.fixture(scope="module")
@@ -45,6 +52,16 @@ def predictor(plant: Config, linear_team: Team) -> Predictor:
     """The truth of the linear team, but for rounding."""
     meta = replace(PredictorMeta.of(plant), ridge=1e-9, block_weight=1.0)
     return fit_ridge([linear_team(2).episode(1500, 1)], meta)
+
+
+def coupled(config: Config, seed: int, strength: float) -> Predictor:
+    """Any G of a plausible size whose blocks off the diagonal are `strength` times as large."""
+    meta = PredictorMeta.of(config)
+    shape = (meta.robots, meta.robots, meta.N, 6, meta.layout.width)
+    G = np.random.default_rng(seed).normal(size=shape)
+    G *= 1e-4 * np.array([1.0, 30.0, 30.0, 10.0, 10.0, 30.0])[:, None]
+    G *= np.where(np.eye(meta.robots), 1.0, strength)[:, :, None, None, None]
+    return Predictor(meta, G.reshape(1, meta.robots, meta.robots, -1, meta.layout.width))
 
 
 def of_kind(config: Config, kind: str) -> Config:
@@ -142,11 +159,27 @@ def test_a_foreign_predictor_is_refused_by_name(
         load_checked(stored, foreign)
 
 
-def test_any_other_key_of_the_planner_is_gated_anew(stored: Path, plant: Config) -> None:
+def test_any_other_key_of_the_planner_is_gated_anew(
+    stored: Path, plant: Config, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As if `force_min` weighed the differences between successive forces: no list names it."""
+    condense = qp.condense
+
+    def smoothing(
+        config: PlannerConfig, G_past: Array, G_u: Array, stance: NDArray[np.bool_]
+    ) -> Condensed:
+        usual = condense(config, G_past, G_u, stance)
+        steps = np.diff(np.eye(len(usual.H)), axis=0)
+        return replace(usual, H=usual.H + config.force_min * steps.T @ steps)
+
     before = load_checked(stored, plant)[1].gates
-    cheap = replace(plant, planner=replace(plant.planner, R=(1e-7, 1e-7, 1e-7)))
-    alone = of_kind(cheap, "decentralised")
+    monkeypatch.setattr(qp, "condense", smoothing)
+    assert load_checked(stored, plant)[1].gates == before, "of the same planner it is not computed"
+    smooth = replace(plant, planner=replace(plant.planner, force_min=5.0))
+    assert load_checked(stored, smooth)[1].gates.radius < 0.9 * before.radius
+    alone = of_kind(smooth, "decentralised")
     assert load_checked(stored, alone)[1].gates == before, "nobody answers anybody's plans"
+    cheap = replace(plant, planner=replace(plant.planner, R=(1e-7, 1e-7, 1e-7)))
     after = load_checked(stored, limited(cheap, max_radius=10.0))[1].gates.radius
     assert after > 2 * before.radius, "with forces made cheap the plans fight harder"
     between = 0.5 * (before.radius + after)
@@ -255,6 +288,15 @@ def test_the_worst_phase_counts(plant: Config, predictor: Predictor) -> None:
     assert iteration_radius(plant, loose) < 0.5 * expected
 
 
+def test_the_table_of_coupling_has_the_norms_of_scaled_blocks(predictor: Predictor) -> None:
+    z_scale = np.r_[np.full(48, 10.0), np.tile(Y_SCALE, 4), np.full(96, 10.0)]
+    scaled = predictor.G[0] * z_scale / np.tile(Y_SCALE, 8)[:, None]
+    found = coupling_table(predictor)
+    np.testing.assert_allclose(found, np.linalg.norm(scaled, axis=(2, 3)))
+    assert found[0, 0] > found[0, 1] > 0.0
+    np.testing.assert_allclose(coupling_table(phased(predictor, 2.0 * predictor.G)), 2.0 * found)
+
+
 # ---- whether the plans converge
 
 
@@ -275,12 +317,41 @@ def test_the_best_response_is_the_planners_own(plant: Config, linear_team: Team)
     best = -np.linalg.solve(G.T @ Q @ G + R, G.T @ Q @ predictor.future_block(0, 1) @ du)
     answer = best_response_map(plant, predictor, step) @ U
     np.testing.assert_allclose(answer[:first], best, atol=1e-9)
-    damped = replace(plant, planner=replace(plant.planner, damping=0.25))
-    mixed = best_response_map(damped, predictor, step) @ U
-    np.testing.assert_allclose(mixed, 0.75 * answer + 0.25 * U, atol=1e-9)
     alone = replace(plant, team=replace(plant.team, robots=1))
     assert iteration_radius(alone, coupled(alone, 0, 1.0)) == 0.0
     assert peers_harm(coupled(alone, 0, 1.0), [linear_team(1).episode(300, 2)]) == {}
+
+
+def test_damping_mixes_the_best_response_with_the_last_plan(plant: Config) -> None:
+    """Eigenvalues λ become (1 − d) λ + d."""
+    predictor = coupled(plant, seed=2, strength=1.0)
+    damped = replace(plant, planner=replace(plant.planner, damping=0.25))
+    values = linalg.eigvals(best_response_map(plant, predictor, 20))
+    expected = np.abs(0.75 * values + 0.25).max()
+    found = np.abs(linalg.eigvals(best_response_map(damped, predictor, 20))).max()
+    assert found == pytest.approx(expected)
+
+
+@settings(max_examples=12, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), strength=st.floats(0.05, 3.0))
+def test_the_radius_tells_whether_the_iteration_of_plans_converges(
+    seed: int, strength: float
+) -> None:
+    """Growth per iteration of the largest plan, measured over many iterations."""
+    planner = replace(Config().planner, N=4, T_ini=2, applied=4)
+    config = replace(Config(), team=replace(Config().team, robots=3), planner=planner)
+    predictor = coupled(config, seed, strength)
+    growth = 0.0
+    for step in range(8, 18):
+        B = best_response_map(config, predictor, step)
+        U = np.random.default_rng(seed).normal(size=len(B))
+        log_size = 0.0
+        for _ in range(500):
+            U = B @ U
+            size = float(np.linalg.norm(U))
+            log_size, U = log_size + np.log(size), U / size
+        growth = max(growth, float(np.exp(log_size / 500)))
+    assert growth == pytest.approx(iteration_radius(config, predictor), rel=0.03)
 
 
 # ---- effect of peers
@@ -296,6 +367,16 @@ def with_peers(predictor: Predictor, factor: float, invented: float = 0.0) -> Pr
         noise = random.normal(size=own.shape) * np.abs(own).mean(axis=2, keepdims=True)
         G[:, i, j, :, past:] += invented * noise
     return replace(predictor, parts=G)
+
+
+@pytest.mark.parametrize("factor", [0.5, 1.0, 2.0, -1.0])
+def test_the_harm_is_that_of_a_part_too_large_or_small(
+    factor: float, predictor: Predictor, linear_team: Team
+) -> None:
+    """Without noise r is the true effect q, and p = a q: harm ((1 − a)² − 1)."""
+    found = peers_harm(with_peers(predictor, factor), [linear_team(2).episode(600, 50)])
+    for name in COUPLED:
+        np.testing.assert_allclose(found[name], (1.0 - factor) ** 2 - 1.0, atol=1e-3)
 
 
 @pytest.mark.parametrize("coupling", [0.0, 1.0])

@@ -26,6 +26,15 @@ def test_hankel_is_equation_2_and_split_is_equation_4() -> None:
     assert (U_p.shape, Y_f.shape) == ((4, 2), (3, 2))
 
 
+@given(SEED, st.integers(1, 4), st.integers(2, 6), st.integers(0, 20))
+def test_a_block_row_is_the_row_above_shifted_by_one_sample(
+    seed: int, m: int, L: int, extra: int
+) -> None:
+    H = hankel(np.random.default_rng(seed).normal(size=(L + extra, m)), L)
+    assert H.shape == (m * L, extra + 1)
+    np.testing.assert_array_equal(H[m:, :-1], H[:-m, 1:])
+
+
 @given(SEED, st.integers(1, 3), st.integers(1, 6), st.lists(st.integers(0, 15), max_size=3))
 def test_the_sliding_gram_matrix_is_that_of_the_explicit_hankel_matrix(
     seed: int, q: int, L: int, extras: list[int]
@@ -36,6 +45,17 @@ def test_the_sliding_gram_matrix_is_that_of_the_explicit_hankel_matrix(
     H = mosaic([short, *signals], L)
     assert H.shape[1] == mosaic(signals, L).shape[1]
     np.testing.assert_allclose(gram([short, *signals], L), H @ H.T, atol=1e-10)
+
+
+def test_no_column_straddles_two_episodes() -> None:
+    H = mosaic([np.full((6, 1), 1.0), np.full((6, 1), 2.0)], 3)
+    assert set(H.ravel()) == {1.0, 2.0}
+    assert (np.ptp(H, axis=0) == 0).all()
+
+
+@pytest.mark.parametrize(("robots", "samples"), [(5, 5794), (10, 18754)])
+def test_required_samples_of_large_teams(robots: int, samples: int) -> None:
+    assert required_samples(12 * robots, 10, 25, 12 * robots) == samples
 
 
 SINE = np.sin(0.7 * np.arange(200))[:, None]

@@ -143,12 +143,20 @@ def test_what_has_no_effect_has_exactly_none(chain: Trotters, fitted: Predictor)
                 assert not has_effect.any()
 
 
+def test_held_out_data_are_predicted_up_to_their_noise(chain: Trotters, fitted: Predictor) -> None:
+    exact = chain.episode(9, 600, noise=0.0)
+    rmse, _, _ = held_out_error(fitted, [exact])
+    forgetful = np.sqrt(np.mean(exact.y**2, axis=(0, 1)))
+    assert (np.sqrt((rmse**2).mean(axis=0)) < 0.3 * forgetful).all()
+
+
 def test_strangers_are_left_out_if_only_yoked_robots_count() -> None:
     everyone = tuple((i, j) for i in range(3) for j in range(3) if i != j)
     team, meta = Trotters(3, everyone), meta_of(3, yokes="chain", neighbours="yoked")
     predictor = fit([team.episode(4, 2000)], meta)
     for i in range(3):
         for j in range(3):
+            assert predictor.G[:, i, j].any() == (abs(i - j) <= 1)
             assert predictor.block(i, j, 3).any() == (abs(i - j) <= 1)
 
 

@@ -9,17 +9,34 @@ from typing import Any
 import numpy as np
 import pytest
 
-from quadriga.agents.predictor.episode import Episode, everyone, wrench_map
+from quadriga.agents.predictor.episode import Y_SCALE, Episode, everyone, wrench_map
 from quadriga.agents.predictor.predictor import KINDS, PredictorMeta, fit, fit_plant
 from quadriga.agents.predictor.store import predictor_sha256
 from quadriga.shared.config.sections import Config, TeamConfig
 from quadriga.shared.errors import PredictorError
 from quadriga.shared.robots.registry import ROBOTS
 from quadriga.shared.runtime.arithmetic import use_one_blas_thread
+from tests.agents.conftest import fit_ridge
 from tests.agents.predictor.plants import Sizes, first_window, random_plant, record
 
 Team = Callable[..., Any]
 TEAM = PredictorMeta.of(Config(team=TeamConfig(robots=4)))
+
+
+def test_the_response_to_a_pulse_is_the_plants(small: Config, linear_team: Team) -> None:
+    """Feedthrough included: u_k acts on y_k, which is taken at the end of the same sample."""
+    team = linear_team(2)
+    meta = replace(PredictorMeta.of(small), ridge=1e-10, block_weight=1.0)
+    predictor = fit_ridge([team.episode(1500, 1)], meta)
+    for j in range(2):
+        du = np.zeros((meta.N, 2, 12))
+        du[0, j, 2] = 10.0
+        true = team.respond(du)
+        assert abs(true[0, j, 0]) > 1e-6
+        for i in range(2):
+            predicted = predictor.future_block(i, j) @ du[:, j].ravel()
+            error = (predicted.reshape(-1, 6) - true[:, i]) / Y_SCALE
+            assert np.abs(error).max() < 1e-6
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -57,6 +74,20 @@ def test_the_wrench_is_that_of_the_forces_at_the_feet(kind: str) -> None:
     np.testing.assert_allclose(wrench[:3], force.sum(axis=0) * unit)
     moment, lever = np.cross(feet, force).sum(axis=0), np.linalg.norm(feet[0])
     np.testing.assert_allclose(wrench[3:], moment * unit / lever, atol=1e-12)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_data_that_no_fit_can_use_are_refused_by_name(
+    kind: str, small: Config, linear_team: Team
+) -> None:
+    meta, good = replace(PredictorMeta.of(small), kind=kind), linear_team(2).episode(100, 16)
+    with pytest.raises(PredictorError, match="at least one"):
+        fit([], meta)
+    with pytest.raises(PredictorError, match=r"got \(agents, inputs, outputs\) = \(2, 12, 6\)"):
+        fit([good], replace(meta, robots=3))
+    short = Episode(good.u[:6], good.u_nominal[:6], good.y[:6], good.y_base[:6], 410)
+    with pytest.raises(PredictorError, match="got 6 samples, expected at least 12"):
+        fit([good, short], meta)
 
 
 # ---- any plant

@@ -87,6 +87,14 @@ def test_a_document_that_was_changed(
         read(stored)
 
 
+def test_a_place_that_cannot_be_written(
+    tmp_path: Path, fitted: tuple[Predictor, Provenance]
+) -> None:
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(PredictorError, match="expected a file that can be written"):
+        save(tmp_path / "file" / "predictor.npz", fitted[0])
+
+
 @pytest.mark.parametrize(
     ("header", "body"),
     [
