@@ -79,11 +79,7 @@ def numbers(*values: float | None) -> Array:
 
 @cache
 def sources_digest(module: str) -> str:
-    """Digest of the text of a module and of all that it imports; 16 hexadecimal digits.
-
-    Raises:
-        QuadrigaError: there is no such module.
-    """
+    """Digest of the text of a module and of all that it imports; 16 hexadecimal digits."""
     digest = hashlib.sha256()
     for path in followed_files(SOURCE, [module]):
         digest.update(f"\0{path.relative_to(SOURCE)}\0".encode() + path.read_bytes())

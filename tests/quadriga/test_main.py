@@ -104,28 +104,6 @@ def test_a_terminal_may_lack_letters() -> None:
     assert "?" in written["iso-8859-1"]
 
 
-@pytest.mark.parametrize(("module", "status"), [("numpy", 2), ("random", 2), ("pinocchio", 1)])
-def test_a_file_that_takes_a_modules_place_is_named(
-    tmp_path: Path, module: str, status: int
-) -> None:
-    foreign = tmp_path / f"{module}.py"
-    foreign.write_text("", encoding="utf-8")
-    (tmp_path / "mine.py").write_text("", encoding="utf-8")
-    done = subprocess.run(
-        [*QUADRIGA, "doctor", "--here"],
-        env={**os.environ, "PYTHONPATH": str(tmp_path)},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == status
-    assert [str(foreign) in text for text in (done.stderr, done.stdout)] == [
-        status == 2,
-        status == 1,
-    ]
-    assert "Traceback" not in done.stderr
-
-
 def test_a_mistake_in_the_command_line_has_its_status() -> None:
     done = subprocess.run([*QUADRIGA, "walc"], capture_output=True, text=True, check=False)
     assert done.returncode == 2

@@ -207,10 +207,8 @@ def test_a_stray_word_is_named(
 
 def test_what_stands_behind_two_dashes_is_no_option(capsys: pytest.CaptureFixture[str]) -> None:
     status, _, err = run(capsys, "info", "--", "--robts")
-    assert (status, err) == (
-        2,
-        "quadriga: --robts: got No such file or directory, expected a recording\n",
-    )
+    missing = "quadriga: --robts: got No such file or directory, expected a recording"
+    assert (status, err) == (2, f"{missing} (did the walk start?)\n")
 
 
 def test_help_is_in_groups_and_lists_every_command(capsys: pytest.CaptureFixture[str]) -> None:

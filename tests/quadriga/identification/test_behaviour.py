@@ -18,7 +18,6 @@ import quadriga
 from quadriga.identification import behaviour as module
 from quadriga.identification import sample_fits
 from quadriga.identification.behaviour import behaviour, digest_of, numbers
-from quadriga.shared.errors import QuadrigaError
 from quadriga.shared.robots.conventions import Array
 
 # A short walk of one robot: machine code for each copy of the package would take a minute.
@@ -132,8 +131,3 @@ def test_other_sources_and_other_arithmetic_ask_for_new_samples(
         monkeypatch.setattr(module, name, lambda *_: "another")
         ask(tmp_path)
     assert len([path for path in cache.iterdir() if path.name != ".lock"]) == 3
-
-
-def test_a_module_that_is_not_there_is_an_error(cache: Path) -> None:
-    with pytest.raises(QuadrigaError, match=r"no file of quadriga\.gone"):
-        behaviour("quadriga.gone")
