@@ -25,7 +25,7 @@ BUDGETS: Final[Mapping[str, int]] = {
     "shared": 8_166,  # planned: 7,200; left: Unitree's protocols, the barrier, 550 lines of keys
     "quadriga": 39_651,  # planned: 18,200; left: harnesses of experiments, report, commands
     "benchmarks": 4_300,  # planned: 1,800
-    "tests": 44_540,  # planned: 28,000
+    "tests": 44_545,  # planned: 28,000
 }
 COUNTED: Final = (".py", ".js", ".css", ".html")
 MOST_ARGUMENTS: Final = 8
