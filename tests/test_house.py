@@ -22,10 +22,10 @@ BUDGETS: Final[Mapping[str, int]] = {
     "plant": 1_102,  # planned: 1,000; left: states and commands over the bus
     "sim_server": 2_639,  # planned: 2,600
     "bridges": 1_904,
-    "shared": 8_166,  # planned: 7,200; left: Unitree's protocols, the barrier, 550 lines of keys
+    "shared": 8_168,  # planned: 7,200; left: Unitree's protocols, the barrier, 550 lines of keys
     "quadriga": 39_651,  # planned: 18,200; left: harnesses of experiments, report, commands
     "benchmarks": 4_300,  # planned: 1,800
-    "tests": 44_545,  # planned: 28,000
+    "tests": 44_742,  # planned: 28,000
 }
 COUNTED: Final = (".py", ".js", ".css", ".html")
 MOST_ARGUMENTS: Final = 8

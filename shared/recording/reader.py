@@ -253,6 +253,8 @@ def content_of(record: bytes) -> bytes:
         unpack = lz4.frame.LZ4FrameDecompressor()
         content = unpack.decompress(chunk.data, max_length=size + 1)
     else:
+        if zstandard.frame_content_size(chunk.data) not in (size, -1):  # which it would allocate
+            raise ValueError(f"a frame that does not unpack to {size} bytes")
         content = zstandard.ZstdDecompressor().decompress(chunk.data, max_output_size=size)
     if len(content) != size or zlib.crc32(content) != chunk.uncompressed_crc:
         raise ValueError("its checksum is wrong")

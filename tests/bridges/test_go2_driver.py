@@ -18,7 +18,7 @@ from quadriga.shared.messages import Command
 from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.shared.unitree import rpc
 from quadriga.shared.unitree.codecs import GO2
-from quadriga.shared.unitree.dds import LOW_COMMANDS, DdsParticipant, StructWriter
+from quadriga.shared.unitree.dds import LOW_COMMANDS, LOW_STATES, DdsParticipant, StructWriter
 from quadriga.shared.unitree.packets import ON
 from quadriga.sim_server.emulator import Go2Emulator
 from quadriga.sim_server.world.world import World
@@ -186,3 +186,16 @@ def test_a_controller_that_does_not_lie_down_or_let_go_is_named(
 def test_without_an_interface_there_is_one_clear_error() -> None:
     with pytest.raises(ConfigError, match=r"bridge.interface: got nothing, expected the one the"):
         Go2Driver(BridgeConfig())
+
+
+def test_damaged_structs_are_counted_on_both_sides(bench: Bench) -> None:
+    ways = [StructWriter(bench.others, topic) for topic in (LOW_COMMANDS, LOW_STATES)]
+
+    def counted() -> bool:
+        for writer, topic in zip(ways, (LOW_COMMANDS, LOW_STATES), strict=True):
+            writer.send(b"\1" * topic.size)
+        bench.driver.receive()
+        return bench.robot.malformed > 3 and bench.driver.counters["malformed"] > 3
+
+    wait_until(counted)
+    assert bench.driver.counters["malformed_crc"] > 3

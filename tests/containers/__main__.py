@@ -110,8 +110,8 @@ class Containers:
     def log(self, service: str) -> str:
         """What a service has said."""
         command = [self._engine, "logs", self.container(service)]
-        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
-        return subprocess.run(command, text=True, check=False, **pipes).stdout  # type: ignore[call-overload,no-any-return]
+        out, both = subprocess.PIPE, subprocess.STDOUT
+        return subprocess.run(command, text=True, check=False, stdout=out, stderr=both).stdout
 
     def container(self, service: str) -> str:
         """The name of a service's container."""
@@ -131,9 +131,16 @@ class Containers:
         return self._call([self._engine, *words], timeout)
 
     def _call(self, command: list[str], timeout: float | None = None) -> str:
-        options = {"cwd": TOP, "env": self._environment, "timeout": timeout}
         try:
-            done = subprocess.run(command, capture_output=True, text=True, check=False, **options)  # type: ignore[call-overload]
+            done = subprocess.run(
+                command,
+                cwd=TOP,
+                env=self._environment,
+                timeout=timeout,
+                capture_output=True,
+                text=True,
+                check=False,
+            )
         except subprocess.TimeoutExpired:
             raise Failure(f"{shlex.join(command)}: not done after {timeout:g} s") from None
         if done.returncode:

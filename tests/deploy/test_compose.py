@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -66,11 +67,27 @@ def started(size: int) -> set[str]:
     }
 
 
-def test_the_file_is_as_the_compose_specification_wants_it() -> None:
-    """By the specification's schema, which comes with the checker."""
+def test_the_file_is_as_the_compose_specification_wants_it(tmp_path: Path) -> None:
+    """By the specification's schema, which comes with the checker and finds a mistake."""
+    wrong = tmp_path / "docker-compose.yml"
+    text = FILE.read_text(encoding="utf-8").replace("stop_grace_period:", "stop_grace_time:")
+    wrong.write_text(text, encoding="utf-8")
     command = [sys.executable, "-m", "check_jsonschema", "--builtin-schema", "vendor.compose-spec"]
-    done = subprocess.run([*command, FILE], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
+    for file, status in ((FILE, 0), (wrong, 1)):
+        done = subprocess.run([*command, file], capture_output=True, text=True, check=False)
+        assert done.returncode == status, done.stdout + done.stderr
+    assert "stop_grace_time" in done.stdout
+
+
+def test_there_is_one_image_of_this_version_that_only_this_file_builds() -> None:
+    project = tomllib.loads((TOP / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    name = f"quadriga:{project['version']}"
+    assert {resolve(found["image"]) for found in SERVICES.values()} == {name}
+    assert f"-t {name} ." in (TOP / "deploy/Dockerfile").read_text(encoding="utf-8")
+    policies = {name: service["pull_policy"] for name, service in SERVICES.items()}
+    assert policies.pop("prepare") == "build"
+    assert set(policies.values()) == {"never"}
+    assert {name for name, service in SERVICES.items() if "build" in service} == {"prepare"}
 
 
 @pytest.mark.parametrize("size", range(1, MOST + 1))
@@ -93,6 +110,17 @@ def test_every_process_of_a_walk_has_a_service_and_its_time_to_leave() -> None:
     assert set(ON_THE_BUS) == {row.name for row in ROWS} | {ROUTER, DOCTOR}
 
 
+def test_the_team_is_that_of_the_default_walk() -> None:
+    config = load(TEAM)
+    assert config.team.robots == load().team.robots
+    assert resolve("${TEAM_SIZE:-3}") == str(config.team.robots)
+    assert len(started(config.team.robots) & set(robot_names(MOST))) == config.team.robots
+    assert config.recorder.enabled
+    for service in (*ONCE, *ON_THE_BUS, VIEW):
+        mounted = mounts_of(service)[str(arguments_of(service).config)]
+        assert (TOP / mounted).resolve() == TEAM, "all read the one configuration"
+
+
 def test_the_team_meets_at_the_router_with_certificates() -> None:
     assert CONFIG.bus.mode == "client"
     assert not CONFIG.bus.plaintext
@@ -111,8 +139,6 @@ def test_a_service_sees_its_own_certificates_and_cannot_change_them(service: str
     own = several.get(service, {service})
     assert secrets_of(service) == own
     entries = [entry for entry in SERVICES[service]["volumes"] if "/secrets/" in entry]
-    mounted = mounts_of(service)[str(arguments_of(service).config)]
-    assert (TOP / mounted).resolve() == TEAM, "all read the one configuration"
     assert set(entries) == {f"secret-{name}:/secrets/{name}:ro" for name in own}
 
 
@@ -165,6 +191,16 @@ def test_the_view_is_reached_from_this_computer_alone_and_keeps_nobody_waiting()
     assert view.host == "0.0.0.0"  # of its container
     assert view.once, "`docker compose up` would not return after the walk"
     assert [name for name, service in SERVICES.items() if "ports" in service] == [VIEW]
+
+
+def test_volumes_are_shared_and_outlive_their_containers() -> None:
+    for service in SERVICES.keys() - {"certs"}:
+        assert mounts_of(service)["/cache"] == "cache", "predictor and compiled code"
+    for service in ("recorder", "replay"):
+        assert mounts_of(service)["/work/runs"] == "runs"
+    assert arguments_of("recorder").output is None, "the default is runs/<date>-<time>"
+    sources = {source for name in SERVICES for source in mounts_of(name).values()}
+    assert {source for source in sources if not source.startswith(".")} == COMPOSE["volumes"].keys()
 
 
 @pytest.mark.parametrize("service", SERVICES)

@@ -59,10 +59,35 @@ def test_the_image_gets_all_that_a_walk_needs_and_nothing_else() -> None:
     assert locked_by_hash().keys() == set(needed(requirements))
 
 
+def test_pip_takes_nothing_without_a_hash_and_builds_nothing() -> None:
+    installs = re.findall(r"pip install (.*)$", DOCKERFILE, re.M)
+    assert installs == [
+        "--require-hashes --only-binary :all: -r image.lock",
+        "--no-index --no-deps --no-build-isolation .",
+    ]
+
+
 def test_nobody_is_root_in_the_image() -> None:
     user = re.findall(r"^USER (\d+):(\d+)$", LAST_STAGE, re.M)[-1]
     assert all(int(number) >= 1000 for number in user)
     assert f"chown -R {':'.join(user)} /cache /health /secrets /work" in LAST_STAGE
+
+
+def test_each_volume_has_a_folder_whose_owner_it_takes_over() -> None:
+    (names,) = re.findall(r"for name in ([a-z0-9 ]+);", LAST_STAGE)
+    secrets = {name.removeprefix("secret-") for name in COMPOSE["volumes"] if "secret-" in name}
+    assert set(names.split()) == secrets
+    made = " ".join(re.findall(r"mkdir -p (.*?) *&&", LAST_STAGE)).split()
+    assert {"/cache", "/health", "/work/runs"} <= set(made)
+
+
+def test_one_image_on_a_base_of_ones_choice() -> None:
+    (base,) = re.findall(r"^ARG BASE=(\S+)$", DOCKERFILE, re.M)
+    assert re.fullmatch(r"python:3\.11-\S+@sha256:[0-9a-f]{64}", base), "by version and digest"
+    assert {line.split()[1] for line in re.findall(r"^FROM .*$", DOCKERFILE, re.M)} == {"${BASE}"}
+    (opengl,) = re.findall(r"^ARG GL=(\S+)$", DOCKERFILE, re.M)
+    built = COMPOSE["services"]["prepare"]["build"]
+    assert built["args"] == {"BASE": f"${{BASE:-{base}}}", "GL": f"${{GL:-{opengl}}}"}
 
 
 def test_the_build_gets_every_package_and_the_scenarios() -> None:

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import sysconfig
 import tarfile
+from email.parser import HeaderParser
 from pathlib import Path
 from zipfile import ZipFile
 
@@ -16,14 +17,14 @@ from tests.deploy.dist import TOP, build_dist
 
 NEIGHBOUR = "openai-agents==0.24.0"  # installs a package `agents`
 FOLDERS = ("agents", "shared", "sim_server", "plant")
-# What a script sees of the installed packages, far from the checkout.
+# What a script sees of the installed package, far from its checkout.
 SEEN = """
-from importlib.util import find_spec as spec
+import quadriga
 from quadriga.experiments.published.catalogue import list_names
 from quadriga.shared.runtime.places import scenario_folder
 from quadriga.team.scenarios import names
-print(len(names()), len(list_names()))
-print(scenario_folder(), spec("quadriga.agents").origin, spec("agents").origin)
+print(quadriga.load_config(scenario="stairs").world.scenario, len(names()), len(list_names()))
+print(quadriga.__file__, scenario_folder())
 """
 
 
@@ -102,22 +103,47 @@ def test_the_wheel_holds_every_file_of_the_package_once_and_nothing_else(
     assert {"pyproject.toml", "README.md", "LICENSE", "requirements.lock", *expected} <= names
 
 
+def test_the_metadata_say_what_it_is(built: tuple[Path, Path]) -> None:
+    with ZipFile(built[0]) as wheel:
+        (folder,) = {name.split("/")[0] for name in wheel.namelist() if ".dist-info/" in name}
+        about = HeaderParser().parsestr(wheel.read(f"{folder}/METADATA").decode())
+        scripts = wheel.read(f"{folder}/entry_points.txt").decode()
+        assert f"{folder}/licenses/LICENSE" in wheel.namelist()
+    assert (about["Name"], about["License-Expression"]) == ("quadriga", "Apache-2.0")
+    assert about["Description-Content-Type"] == "text/markdown"
+    assert "Typing :: Typed" in about.get_all("Classifier", [])
+    assert {"frame", "export", "campaign"} <= {*about.get_all("Provides-Extra", [])}
+    assert "quadriga = quadriga.__main__:main" in scripts
+
+
 @pytest.mark.nightly
-def test_a_team_walks_far_from_the_checkout_beside_a_package_named_agents(
+def test_a_script_far_from_the_checkout_has_scenarios_and_experiments(
     environment: Path, tmp_path: Path
 ) -> None:
+    packages = next(environment.glob("lib/python*/site-packages"))
+    counts, places = run(environment, "python", "-c", SEEN, folder=tmp_path).splitlines()
+    scenarios, experiments = (
+        len([*(TOP / "deploy" / name).glob("*.toml")]) for name in ("scenarios", "experiments")
+    )
+    assert counts == f"stairs {scenarios} {experiments}"
+    for place in places.split():
+        assert Path(place).is_relative_to(packages / "quadriga")
+
+
+@pytest.mark.nightly
+def test_a_team_walks_beside_a_package_named_agents(environment: Path, tmp_path: Path) -> None:
     """In a folder, too, in which other things have the names of this project's folders."""
     for name in FOLDERS:
         (tmp_path / name).mkdir()
         (tmp_path / name / "__init__.py").write_text("raise ImportError('foreign')\n")
+    where = (
+        "from importlib.util import find_spec as spec; "
+        "print(spec('agents').origin, spec('quadriga.agents').origin)"
+    )
+    theirs, ours = run(environment, "python", "-P", "-c", where, folder=tmp_path).split()
     packages = next(environment.glob("lib/python*/site-packages"))
-    counts, places = run(environment, "python", "-P", "-c", SEEN, folder=tmp_path).splitlines()
-    found = [len([*(TOP / "deploy" / n).glob("*.toml")]) for n in ("scenarios", "experiments")]
-    assert counts.split() == [str(count) for count in found]
-    scenarios, ours, theirs = (Path(place) for place in places.split())
-    assert scenarios.is_relative_to(packages / "quadriga")
-    assert ours == packages / "quadriga" / "agents" / "__init__.py"
-    assert theirs == packages / "agents" / "__init__.py"
+    assert Path(theirs) == packages / "agents" / "__init__.py"
+    assert Path(ours) == packages / "quadriga" / "agents" / "__init__.py"
     walk = ("--robots", "1", "--seconds", "0.5", "--planner", "none", "--out", tmp_path / "run")
     early = "gait.stand_ms=100"  # each tick takes long without machine code, in the rehearsal too
     run(environment, "python", "-m", "quadriga", "walk", *walk, "--set", early, folder=tmp_path)

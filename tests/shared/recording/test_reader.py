@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
+import struct
+import zlib
 from pathlib import Path
 
 import numpy as np
 import pytest
+import zstandard
 from mcap.reader import make_reader
 from mcap.records import Chunk, DataEnd, Footer
 from mcap.stream_reader import StreamReader
@@ -16,7 +19,7 @@ from quadriga.shared.codec import encode
 from quadriga.shared.errors import RecordingError
 from quadriga.shared.messages import Command, Reference, State
 from quadriga.shared.recording.metadata import PROFILE, seal
-from quadriga.shared.recording.reader import Recording
+from quadriga.shared.recording.reader import Recording, content_of
 from quadriga.shared.recording.writer import RecordingWriter
 from quadriga.shared.topics import TABLE
 
@@ -201,3 +204,10 @@ def test_a_log_time_that_no_table_can_hold_is_read_as_the_latest_that_one_can(
             writer.write("team/estop", b"", log_time)
     times = [entry.log_time_ns for entry in Recording(tmp_path / "run.mcap").entries()]
     assert np.array(times, dtype=np.int64).tolist() == [1] + [(1 << 63) - 1] * 3
+
+
+def test_a_frame_that_would_unpack_to_more_than_its_chunk_says_is_not_unpacked() -> None:
+    data = zstandard.ZstdCompressor().compress(bytes(1 << 20))
+    head = struct.pack("<QQQII", 0, 0, 1000, zlib.crc32(bytes(1000)), len("zstd"))
+    with pytest.raises(ValueError, match="does not unpack to 1000 bytes"):
+        content_of(head + b"zstd" + struct.pack("<Q", len(data)) + data)

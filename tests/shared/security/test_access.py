@@ -17,6 +17,7 @@ from quadriga.shared.security.access import (
     team_identities,
     team_rights,
 )
+from quadriga.shared.topics import TABLE
 
 EACH = {"team.plant_per_robot": True, "world.mode": "realtime", "team.yokes": "none"}
 TWO = load(None, {"team.robots": 2})
@@ -118,3 +119,9 @@ def test_nobody_takes_more_than_its_share_of_the_router() -> None:
     assert found["transport/link/rx/max_message_size"] == MAX_BYTES
     assert found["transport/unicast/max_links"] == 1
     assert found["transport/unicast/max_sessions"] > len(team_identities(TWO))
+
+
+def test_every_topic_has_somebody_who_may_send_it() -> None:
+    for found in (rights(), rights(**EACH)):
+        sent = {key for each in found.values() for key in each.publishes}
+        assert {topic.key("team", robot) for topic in TABLE for robot in ("r1", "r2")} <= sent
