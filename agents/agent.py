@@ -8,17 +8,24 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import field, replace
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from quadriga.agents.controller.controller import control
+from quadriga.agents.controller.controller import command_row, control
 from quadriga.agents.controller.trunk import TrunkCommand
 from quadriga.agents.controller.whole_body_qp import UNCONSTRAINED, WholeBodySolution
 from quadriga.agents.estimator.estimator import estimate, truth_row
 from quadriga.agents.estimator.robot_state import RobotState, gains_row
 from quadriga.agents.gait import Gait
-from quadriga.agents.modes import ModeRules, ResumeState, Statuses, newest_statuses, ramp
+from quadriga.agents.modes import (
+    SILENCE_MS,
+    ModeRules,
+    ResumeState,
+    Statuses,
+    newest_statuses,
+    ramp,
+)
 from quadriga.agents.planner.solver import SOLVED, SolvedQp
 from quadriga.agents.planner.team import Collected
 from quadriga.agents.planning.active_plan import PlanCheck, Setpoint, setpoint_at
@@ -49,6 +56,7 @@ from quadriga.shared.runtime.record import record
 from quadriga.shared.topics import REFERENCE, REFERENCE_EPOCH_MS, SAMPLE_MS
 
 _TRUTH_AGE_MS: Final = 20  # of the simulator's truth, where it stands in for an estimator
+QP_CONSTRAINED: Final = "qp_constrained"  # counter: ticks at which a limit of the QP was active
 _LONGEST_DT: Final = 0.02  # s, after a gap in the ticks the filters advance by no more than this
 
 
@@ -77,6 +85,22 @@ class AgentState:
     standing_since: Array | None = None
 
 
+class Acted(NamedTuple):
+    """What the state of a tick alone has come to, before the rest of the step.
+
+    Attributes:
+        readings: remembered of the sensors, all valid.
+        estimated: the robot before it was commanded.
+        controlled: to remember of it.
+        solution: of the whole-body QP, with torques that may be used.
+    """
+
+    readings: Array
+    estimated: RobotState
+    controlled: RobotState
+    solution: WholeBodySolution
+
+
 class Agent:
     """Fixed data of one robot's agent; `step` is a function of state and inputs alone.
 
@@ -87,6 +111,13 @@ class Agent:
             central planner.
         clock_ns: read around the planner for `Outputs.planner_ns`; nothing else depends on it.
         collected: reads the collected episodes, for agents that plan with them.
+
+    Attributes:
+        gains: `gains_row`.
+        gait: the robot's.
+        validator: checks its readings.
+        fallen_cosine: of the tilt of a trunk that has fallen.
+        plans_at_once: whether a plan takes effect at the tick at which it is made.
     """
 
     def __init__(
@@ -100,18 +131,19 @@ class Agent:
         self.config = config
         self.robot = robot
         self.index = robot_names(config.team.robots).index(robot)
-        self._gains = gains_row(config)
+        self.gains = gains_row(config)
         self._planning = build_planning(config, self.index, predictor, clock_ns, collected)
         self._plan_check = PlanCheck(config, self.index)
         self._by_truth = config.estimator.kind == "truth"
         self._height = config.reference.height
         self._modes, self._stand_up = ModeRules(config, robot), StandUpRules(config)
-        self._validator = Validator(config, self.index)
-        self._gait = Gait(config, self.index)
+        self.validator = Validator(config, self.index)
+        self.gait = Gait(config, self.index)
+        self.plans_at_once = self._planning.effect_ms == 0
         self._feedforward = config.planner.interface == "feedforward"
         # Planned height and tilt are in general not tracked: the reference would follow the error.
         self._tracks_all = not self._feedforward and config.planner.tracked == "outputs"
-        self._fallen_cosine = math.cos(config.controller.fall_tilt)
+        self.fallen_cosine = math.cos(config.controller.fall_tilt)
         self._damping = config.controller.damping
         self._max_failures = config.controller.max_failures
 
@@ -138,6 +170,48 @@ class Agent:
             return self._step_of_standing_up(state, inputs)
         return self._tick(state, inputs)[:2]
 
+    def finish_step(
+        self, state: AgentState, inputs: Inputs, acted: Acted
+    ) -> tuple[AgentState, Outputs]:
+        """As `step`, of a tick whose state has been answered: see `agents.plain_ticks`."""
+        return self._tick(state, inputs, acted)[:2]
+
+    def plain_until(self, state: AgentState) -> tuple[int, int]:
+        """Until when ticks behind a state are plain: nothing happens in them but what is sensed.
+
+        Returns:
+            The first tick at which more is due than an answer, and the last one at which a plain
+            tick answers: that before it where a plan takes effect at once, and that of `state`
+            where none is plain.
+        """
+        tick, mode = state.tick, state.mode
+        ramps = ramp(state.references, state.resume, tick) is not state.references
+        if mode.name != WALK or self._by_truth or ramps or state.failures or state.readings is None:
+            return tick, tick
+        _, age = reference_at(state.references, tick, self._height)
+        heard = min((status.tick for status in state.statuses.values()), default=tick)
+        due = min(
+            tick - tick % SAMPLE_MS + SAMPLE_MS,
+            self._planning.next_due(tick),
+            tick - age + REFERENCE.max_age_ms,
+            heard + SILENCE_MS,
+        )
+        return due, due - self.plans_at_once
+
+    def plain_command(self, state: AgentState, tick: int) -> tuple[int, Array]:
+        """What the controller is asked at plain ticks from one behind `state` on, and until when.
+
+        A row of `trunk.COMMAND`.
+        """
+        reference, _ = reference_at(state.references, tick, self._height)
+        setpoint = setpoint_at(state.plans, tick)
+        asked = self._trunk_command(tick, state.mode, reference, setpoint, None)
+        begins = (*(plan.start for plan in state.plans), *(r.tick for r in state.references))
+        change = min((begin for begin in begins if begin > tick), default=tick + SAMPLE_MS)
+        new_sample = tick % SAMPLE_MS == 0
+        change = tick + 1 if new_sample else min(change, tick - tick % SAMPLE_MS + SAMPLE_MS)
+        return change, command_row(asked, new_sample=new_sample)
+
     def problems_of(
         self, state: AgentState, inputs: Inputs
     ) -> tuple[WholeBodySolution, SolvedQp | None] | None:
@@ -155,7 +229,7 @@ class Agent:
         return state.stand_up is not None or self._stand_up.begins(state.mode, inputs)
 
     def _tick(
-        self, state: AgentState, inputs: Inputs
+        self, state: AgentState, inputs: Inputs, acted: Acted | None = None
     ) -> tuple[AgentState, Outputs, PlanningInputs, WholeBodySolution]:
         """Validate, estimate, plan, control; the stops of all of these are resolved at the end.
 
@@ -164,7 +238,10 @@ class Agent:
         tick = inputs.state.tick
         dt = 1e-3 if state.tick < 0 else min(_LONGEST_DT, 1e-3 * (tick - state.tick))
 
-        read = self._validator.step(state.readings, inputs.state, 1e-3 * (tick - state.tick))
+        if acted is None:
+            read = self.validator.step(state.readings, inputs.state, 1e-3 * (tick - state.tick))
+        else:
+            read = Validated(acted.readings, inputs.state, imu=False, encoders=(), lost="")
         inputs = inputs if read.complete else replace(inputs, state=read.state)
         mode, resume = self._modes.course(state.mode, state.resume, state.tick, tick)
         references = remember_references(state.references, inputs.references, tick)
@@ -175,9 +252,9 @@ class Agent:
         if read.lost:
             stops.append(Stop(STAND, read.lost))
 
-        schedule = self._gait.at(tick, mode)
-        robot = self._estimate(state, inputs, schedule, dt)
-        if not robot.upright >= self._fallen_cosine:
+        schedule = self.gait.at(tick, mode)
+        robot = self._estimate(state, inputs, schedule, dt) if acted is None else acted.estimated
+        if not robot.upright >= self.fallen_cosine:
             stops.append(Stop(PASSIVE, NO_ESTIMATE if math.isnan(robot.upright) else FALL))
 
         measurement = self._sample_measurement(state, tick, robot)
@@ -187,10 +264,15 @@ class Agent:
         if planned.stop_reason:
             stops.append(Stop(STOPPING, planned.stop_reason))
 
-        setpoint = setpoint_at(plans, tick)
-        trunk = self._trunk_command(tick, mode, reference, setpoint, inputs.excitation)
-        new_sample = tick // SAMPLE_MS != state.tick // SAMPLE_MS
-        controlled, solution = control(robot, trunk, self._gains, new_sample=new_sample)
+        if acted is None:
+            # A plan that takes effect later changes nothing now, not even one that is refused.
+            at_once = self.plans_at_once or mode.name != WALK
+            setpoint = setpoint_at(plans if at_once else state.plans, tick)
+            trunk = self._trunk_command(tick, mode, reference, setpoint, inputs.excitation)
+            new_sample = tick // SAMPLE_MS != state.tick // SAMPLE_MS
+            controlled, solution = control(robot, trunk, self.gains, new_sample=new_sample)
+        else:
+            controlled, solution = acted.controlled, acted.solution
         failures = 0 if solution.solved else state.failures + 1
         if failures >= self._max_failures:
             stops.append(Stop(PASSIVE, f"qp-{solution.status}"))
@@ -199,7 +281,7 @@ class Agent:
         tau = state.last_tau if failures else solution.tau  # the QP's, or the last good ones
         standing_since, command = None, self._command(tick, tau, mode, solved=not failures)
         if mode.name == STAND and not read.complete:
-            standing_since, command = self._validator.stand(state.standing_since, read)
+            standing_since, command = self.validator.stand(state.standing_since, read)
 
         inputs_ok = (
             mode.name == STAND
@@ -264,7 +346,7 @@ class Agent:
         # One that is lost or late is bridged by the filter.
         if self._by_truth and truth is not None and inputs.state.tick - truth.tick <= _TRUTH_AGE_MS:
             known = truth_row(truth, self.robot)
-        return estimate(state.controller_state, inputs.state, schedule, dt, self._gains, known)
+        return estimate(state.controller_state, inputs.state, schedule, dt, self.gains, known)
 
     def _sample_measurement(
         self, state: AgentState, tick: int, robot: RobotState
@@ -280,7 +362,7 @@ class Agent:
         begun = tick - SAMPLE_MS
         if tick % SAMPLE_MS or begun < 0 or begun > state.tick:
             return None
-        stance = self._gait.at(begun, state.mode)[:4]
+        stance = self.gait.at(begun, state.mode)[:4]
         return Measurement(tick, tick * 1_000_000, robot.mean_planned_force, robot.outputs, stance)
 
     def _trunk_command(
@@ -330,7 +412,7 @@ def _count(
         names.append(f"plan_{code_of(planned.plan.status)}")
     names += planned.unusual
     if solution.status != UNCONSTRAINED:
-        names.append("qp_constrained" if solution.solved else "qp_failed")
+        names.append(QP_CONSTRAINED if solution.solved else "qp_failed")
     if not names:
         return counters
     return {**counters, **{name: counters.get(name, 0) + 1 for name in names}}

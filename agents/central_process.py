@@ -82,7 +82,7 @@ class _CentralShell:
         for key in self._topics:
             bus.subscribe(key)
         keys = {name: PLAN.key(team, name) for name in names} | {"": STATUS.key(team, PLANNER)}
-        self._put = {n: bus.publisher(key, droppable=realtime) for n, key in keys.items()}
+        self._put = {n: bus.publisher(key, waits=not realtime) for n, key in keys.items()}
         self._lead = Liveness(bus, config)
         self._patience = 0.0 if realtime else PEER_TIMEOUT
         self._references: list[Reference] = []

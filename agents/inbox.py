@@ -49,6 +49,7 @@ UNREADABLE: Final = "unreadable"  # reason of a stop whose message does not deco
 ANYONE: Final = "anyone"  # who stopped the team, released a stop or had it go on
 _NEVER: Final = (-1, 0)
 _HELD: Final = 256  # messages of one source beyond those of the stand; more can only be a flood
+_COMMANDING: Final = frozenset((REFERENCE.name, TRUTH.name))
 _ASKED_FOR: Final = frozenset(topic.name for topic in REQUESTS)
 
 
@@ -131,6 +132,7 @@ class Inbox:
         source = (topic.name, sender)
         if isinstance(message, State):
             self._keep_newest(message)
+            return
         elif topic in REQUESTS:
             # What is said may come twice; a release may end no stop that was pressed meanwhile.
             if topic is not RESET or message != self._released:
@@ -152,6 +154,30 @@ class Inbox:
             self._held[source].append(message)
             self._newest[source] = max(self._newest.get(source, _NEVER), order_of(message))
         self.received[source] += 1
+
+    def take_state(self, state: State) -> None:
+        """Take in a state that the plant link has brought."""
+        if is_measurable(state.row, self._measurable):
+            self._keep_newest(state)
+        else:
+            self.counters[f"dropped_{STATE.name}"] += 1
+
+    def pass_state(self, tick: int) -> None:
+        """Note a state that has been answered already."""
+        self._newest_state = tick
+        self.ended = self.ended and tick <= self._end + self._apart_ms
+
+    @property
+    def holds_commands(self) -> bool:
+        """Whether there is anything that changes what the robot does at the next tick."""
+        return bool(self._requests) or (
+            not self._lockstep and any(source[0] in _COMMANDING for source in self._held)
+        )
+
+    @property
+    def holds_due(self) -> bool:
+        """Whether there is anything that the next step takes in, whatever it expects."""
+        return bool(self._requests) or (not self._lockstep and bool(self._held))
 
     @property
     def _latest(self) -> int:

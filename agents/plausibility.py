@@ -77,13 +77,13 @@ def measured_limits(robot: RobotSpec) -> Array:
 
 @compiled
 def is_measurable(row: Array, most: Array) -> bool:
-    """Whether all numbers of a state, `State.row`, keep to `measured_limits`, or are none.
+    """Whether all numbers of a state, `State.row`, are some and keep to `measured_limits`.
 
     In numpy's operations this takes seven times as long: each goes through much code.
     """
     within = True
     for index in range(len(most)):
-        within = within and not abs(row[index]) > most[index]
+        within = within and abs(row[index]) <= most[index]
     return within
 
 

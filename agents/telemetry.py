@@ -13,7 +13,6 @@ from quadriga.shared.modes import WALK
 from quadriga.shared.runtime.histogram import Histogram
 
 PERIOD_MS: Final = 100
-_TICK_MS: Final = 1.0  # what a tick may take in real time
 _BIN_MS: Final = 0.02
 
 
@@ -29,7 +28,6 @@ class Telemetry:
         """
         self._estimator, self._paced = estimator, paced
         self._jitter = Histogram(_BIN_MS)
-        self._missed = 0
         self._newest_state = (-1, 0)  # tick and wall-clock time of the newest state
         self._mode = ("", "")
         self._planner_ms: list[float] = []
@@ -37,16 +35,12 @@ class Telemetry:
         self._last = -PERIOD_MS
         self._ages_ms: dict[str, float] = {}  # each as it was last in this walk
 
-    def note_step(self, outputs: Outputs, tick_ns: int) -> None:
-        """Add one tick.
-
-        Args:
-            outputs: what the agent's step gave.
-            tick_ns: wall-clock time from taking the state to having sent the command.
-        """
+    def note_answer(self, tick_ns: int) -> None:
+        """Add one tick, by its wall-clock time from a state to having sent the command."""
         self._tick_us.append(1e-3 * tick_ns)
-        if self._paced and tick_ns > _TICK_MS * 1e6:
-            self._missed += 1
+
+    def note_step(self, outputs: Outputs) -> None:
+        """Add what the agent's step gave."""
         if outputs.mode != WALK:
             self._ages_ms.clear()  # a plan that ended the walk is none that the next one uses
         self._ages_ms.update(outputs.ages_ms)
@@ -66,14 +60,13 @@ class Telemetry:
         if mode == self._mode and tick < self._last + PERIOD_MS:
             return None
         self._mode, self._last = mode, tick - tick % PERIOD_MS
-        missed = {"deadlines_missed": self._missed} if self._paced else {}
         status = Status(
             tick,
             tick * 1_000_000,
             *mode,
             self._estimator,
             {**self._ages_ms, **self._jitter.quantiles("jitter")},
-            {**outputs.counters, **counters, **missed},
+            {**outputs.counters, **counters},
             np.array(self._planner_ms),
             np.array(self._tick_us),
         )

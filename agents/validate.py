@@ -59,7 +59,7 @@ _N_STATE: Final = max(cut.stop for cut in State.CUTS.values())
 
 
 # What is remembered of the readings from one tick to the next, see `RobotState` of such rows.
-_MEMORY: Final = np.dtype(
+READINGS: Final = np.dtype(
     (
         np.record,
         [
@@ -78,7 +78,7 @@ class Validated(NamedTuple):
     """What is known of the sensors after a tick.
 
     Attributes:
-        memory: for the next tick, a row of `_MEMORY`.
+        memory: for the next tick, a row of `READINGS`.
         state: what was read, with the last valid readings in place of invalid ones.
         imu: whether a reading of the IMU is invalid now.
         encoders: joints, of 0 … 11, whose encoder's reading is invalid now.
@@ -103,18 +103,21 @@ class Validator:
     Args:
         config: the team's configuration.
         index: the robot's place in the team, 0-based.
+
+    Attributes:
+        lower, upper: angles within which an encoder's reading can be, (12,), rad.
     """
 
     def __init__(self, config: Config, index: int) -> None:
         robot = config.robot
         yoked = neighbours(config.team.robots, config.team.yokes, index)
         self._hold_ms = HOLD_YOKED_MS if yoked else HOLD_MS
-        self._lower = np.array(robot.lower) - _BEYOND
-        self._upper = np.array(robot.upper) + _BEYOND
+        self.lower = np.array(robot.lower) - _BEYOND
+        self.upper = np.array(robot.upper) + _BEYOND
         self._stand, self._standing_torque = robot.q_stand, standing_torques(robot)
         self._kp, self._kd = config.bridge.stand_kp, config.bridge.stand_kd
         # Compiled, or loaded, now and not in the first tick.
-        _validate(_first(np.zeros(_N_STATE)), np.zeros(_N_STATE), self._lower, self._upper, 1e-3)
+        validate_rows(_first(np.zeros(_N_STATE)), np.zeros(_N_STATE), self.lower, self.upper, 1e-3)
 
     def step(self, memory: Array | None, state: State, dt: float) -> Validated:
         """Check the readings of a tick.
@@ -125,9 +128,9 @@ class Validator:
             dt: time since the last reading, s.
         """
         row = _first(state.row) if memory is None else memory.copy()
-        if _validate(row, state.row, self._lower, self._upper, dt):
+        if validate_rows(row, state.row, self.lower, self.upper, dt):
             return Validated(row, state, imu=False, encoders=(), lost="")
-        known = row.view(_MEMORY)[0]
+        known = row.view(READINGS)[0]
         invalid = np.flatnonzero(known.missing > 0.0).tolist()
         encoders = tuple(joint for joint in invalid if joint < N_JOINTS)
         imu, stands_in = len(encoders) < len(invalid), state.row.copy()
@@ -182,8 +185,8 @@ def standing_torques(robot: RobotSpec) -> Array:
 
 def _first(state: Array) -> Array:
     """What is remembered before the first tick: nothing is doubted, the trunk is level."""
-    row = np.zeros(_MEMORY.itemsize // 8)
-    memory = row.view(_MEMORY)[0]
+    row = np.zeros(READINGS.itemsize // 8)
+    memory = row.view(READINGS)[0]
     memory.read = memory.valid = state
     memory.valid[_QUAT] = 1.0, 0.0, 0.0, 0.0
     memory.agrees, memory.up = AGREES_MS, GRAVITY
@@ -191,9 +194,9 @@ def _first(state: Array) -> Array:
 
 
 @compiled
-def _validate(row: Array, state: Array, lower: Array, upper: Array, dt: float) -> bool:
-    """Whether all readings of a tick are valid; `row`, of `_MEMORY`, is brought up to date."""
-    memory, ms, whole = row.view(_MEMORY)[0], 1e3 * dt, True
+def validate_rows(row: Array, state: Array, lower: Array, upper: Array, dt: float) -> bool:
+    """Whether all readings of a tick are valid; `row`, of `READINGS`, is brought up to date."""
+    memory, ms, whole = row.view(READINGS)[0], 1e3 * dt, True
     jump = _JUMP + _FASTEST * max(0.0, dt - 1e-3)
     for index in range(_N_SENSORS):
         if index == _IMU:

@@ -56,8 +56,8 @@ def main() -> None:
 def _send(config: Config, bus: Bus, me: str, seconds: float) -> tuple[int, int]:
     """Send plans and measurements at their rates; when it began and ended, ns."""
     horizon, applied = config.planner.N, config.planner.applied
-    plan_put = bus.publisher(PLAN.key(bus.team, me), droppable=True)
-    sample_put = bus.publisher(MEASUREMENT.key(bus.team, me), droppable=True)
+    plan_put = bus.publisher(PLAN.key(bus.team, me), waits=False)
+    sample_put = bus.publisher(MEASUREMENT.key(bus.team, me), waits=False)
     u, y = np.zeros((horizon, 12)), np.zeros((horizon, 6))
     begun = monotonic_ns()
     for sample in range(round(1e3 * seconds / SAMPLE_MS)):

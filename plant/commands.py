@@ -1,26 +1,23 @@
-"""Commands as they arrive at the plant: decoded, checked, aged; late ones are held, then lost.
+"""Commands as they arrive at the plant: checked and aged; late ones are held, then lost.
 
-Every finite number passes the wire. A gain of 1e300 makes the sum that a motor forms infinite minus
+A gain of 1e300 makes the sum that a motor forms infinite minus
 infinite, which is no number, and then the whole world that it moves is none. So none beyond the
-limits drives a robot, simulated or real. Whoever may publish on a robot's key can still command all
-that is within them.
+limits drives a robot, simulated or real. A robot's agent can still command all that is within them.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from typing import Final
 
 import numpy as np
 
-from quadriga.shared.codec import decode, encode
 from quadriga.shared.config.sections import WorldConfig
-from quadriga.shared.errors import MessageError
 from quadriga.shared.messages import Command, State
 from quadriga.shared.robots.conventions import N_JOINTS, Array
 from quadriga.shared.robots.spec import RobotSpec
-from quadriga.shared.topics import COMMAND
+from quadriga.shared.runtime.jit import compiled
 
 MOST_KP: Final = 500.0  # N·m/rad, stiffer than any of these robots' motors are run
 MOST_KD: Final = 30.0  # N·m·s/rad
@@ -59,74 +56,69 @@ class CommandBox:
     """The newest valid command of every robot, and what was refused.
 
     Args:
-        team: the team's name.
-        names: of its robots whose commands count.
-        robot: their kind.
+        robot: the kind of the robots.
 
     Attributes:
         latest: by robot, in no particular order.
-        invalid: number of a robot's packets that no process of this project sends.
+        invalid: number of a robot's commands that no process of this project sends.
         errors: by robot, what was wrong with the latest of those.
         refused: by robot, what was wrong with the latest command, if it does not count.
     """
 
-    def __init__(self, team: str, names: Iterable[str], robot: RobotSpec) -> None:
-        self.robots = {COMMAND.key(team, name): name for name in names}
+    def __init__(self, robot: RobotSpec) -> None:
         self._least, self._most = command_limits(robot)
         self.latest: dict[str, Command] = {}
         self.invalid: Counter[str] = Counter()
         self.errors: dict[str, str] = {}
         self.refused: dict[str, str] = {}
-        # The first one read compiles or loads what reads it, which is not for the first tick.
-        decode(encode(Command(0, 0, *np.zeros((5, N_JOINTS)))), Command)
+        _first_beyond(self._least, self._least, self._most)  # compiled, or loaded, now
 
     def tick_of(self, robot: str) -> int:
         """Tick of the robot's newest command, −1 before the first."""
         known = self.latest.get(robot)
         return -1 if known is None else known.tick
 
-    def take(self, key: str, payload: bytes, tick: int, oldest: int) -> str:
-        """Take in a packet; the robot's name if its command is now newer.
+    def take(self, robot: str, command: Command, tick: int, oldest: int) -> bool:
+        """Take in a robot's command; whether it is newer than what was known.
 
         Refused are a command with numbers beyond `command_limits`, and one of a tick before
         `oldest` or after `tick`, the newest of which the robots' states are published. Of two
         commands of one tick the first counts: the plant cannot know which of them is meant. That
         they differ is told.
         """
-        robot = self.robots.get(key)
-        if robot is None:
-            return ""
-        try:
-            command = decode(payload, Command)
-        except MessageError as error:
-            return self._refuse_invalid(robot, str(error))
         known = self.latest.get(robot)
         if known is not None and command.tick == known.tick:
             if command.row.tobytes() != known.row.tobytes():
                 differ = f"command: got two of tick {command.tick} for {robot}, expected one"
-                self._refuse_invalid(robot, f"{differ} (does someone else command it?)")
-            return ""
+                self.refuse(robot, f"{differ} (does someone else command it?)")
+            return False
         first = max(oldest, self.tick_of(robot) + 1)
         if not first <= command.tick <= tick:
             wanted = f"{first} … {tick}" if first < tick else f"{first}"
             self.refused[robot] = f"command.tick: got {command.tick}, expected {wanted}"
-            return ""
-        beyond = (command.row < self._least) | (command.row > self._most)
-        if beyond.any():
-            at = int(beyond.argmax())
+            return False
+        if (at := _first_beyond(command.row, self._least, self._most)) >= 0:
             name = next(name for name, cut in Command.CUTS.items() if at < cut.stop)
             wanted = f"{self._least[at]:g} … {self._most[at]:g}"
-            got = f"command.{name}: got {command.row[at]:g}"
-            return self._refuse_invalid(robot, f"{got}, expected {wanted}")
+            self.refuse(robot, f"command.{name}: got {command.row[at]:g}, expected {wanted}")
+            return False
         self.latest[robot] = command
         self.refused.pop(robot, None)
-        return robot
+        return True
 
-    def _refuse_invalid(self, robot: str, error: str) -> str:
-        """Count a packet that no process of this project sends; no robot has a newer command."""
+    def refuse(self, robot: str, error: str) -> None:
+        """Count a command that no process of this project sends; no robot has a newer one."""
         self.invalid[robot] += 1
         self.errors[robot] = self.refused[robot] = error
-        return ""
+
+
+@compiled
+def _first_beyond(row: Array, least: Array, most: Array) -> int:
+    """Index of the first number beyond its limits, or that is none; −1 where there is none."""
+    for index in range(len(row)):
+        if not least[index] <= row[index] <= most[index]:
+            return index
+    return -1
 
 
 class CommandTimeout:

@@ -1,7 +1,8 @@
 """SHELL of the two ways in which a plant's ticks go on.
 
-In lock-step a tick is taken when every robot's command of that tick is there. In real time one is
-taken every millisecond, with the latest commands, aged. With a plant for each robot tick k begins
+In lock-step a tick is taken when every robot's command of that tick is there. In real time states
+are sent when a tick begins, every millisecond, commands are due half a tick later, and what has not
+come by then is replaced by the latest commands, aged. With a plant for each robot tick k begins
 at T0 + k ms by the system clock, which PTP or chrony keeps equal on a team's computers. The plant
 that drives time sets T0, which the others read in what it says of itself. From T0 on ticks go by
 the monotonic clock, whose rate PTP sets too, so that who sets the system clock moves no tick. Who
@@ -17,12 +18,13 @@ from typing import Final
 from quadriga.plant.commands import CommandTimeout
 from quadriga.plant.deadlines import PERIOD_MS, Deadlines
 from quadriga.plant.protocol import TOLD_TO_STOP, End
-from quadriga.plant.server import PlantServer
+from quadriga.plant.server import NEWER, PlantServer
 from quadriga.shared.bus.diagnostics import CLOCK_REMEDY, PACE_LIMIT, clock_difference, lead
 from quadriga.shared.bus.discovery import ProcessInfo, ask, ask_clock
-from quadriga.shared.bus.session import HERE, POLL, Bus
+from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import BusError
+from quadriga.shared.link.connections import CLOSED, NOTHING
 from quadriga.shared.members import LEADS, has_lead
 from quadriga.shared.messages import Command
 from quadriga.shared.runtime.clock import (
@@ -38,6 +40,7 @@ from quadriga.shared.topics import SAMPLE_MS
 TICK: Final = 1e-3  # s
 _SLACK: Final = 3.0  # ticks that the plant of all robots makes up for
 _TICK_NS: Final = 1_000_000
+_DUE: Final = 0.5  # share of a tick after which commands are due
 _LEAST_GAP_NS: Final = _TICK_NS // 2  # between the beginnings of two ticks
 _AHEAD_NS: Final = 500_000_000  # from when T0 is set: all hear of it meanwhile
 _QUIET_NS: Final = 2_000_000  # before T0, in which nothing else is done
@@ -58,20 +61,22 @@ def run_lockstep(server: PlantServer, stopped: Callable[[], bool]) -> End:
 
 def _await_commands(server: PlantServer, stopped: Callable[[], bool]) -> dict[str, Command]:
     """This tick's commands, by robot in the team's order; ends the walk if one does not come."""
-    tick, box, bus = server.plant.tick, server.commands, server.bus
+    tick, box = server.plant.tick, server.commands
     patience = server.config.world.command_timeout
-    waiting, deadline = set(server.plant.names), monotonic() + patience
-    while waiting and not stopped() and server.time.end is None:
-        left = deadline - monotonic()
-        packet = bus.get(min(max(left, 0.0), POLL))
-        if packet is not None:
-            waiting.discard(server.take(*packet, oldest=tick))
-        elif left <= 0.0:  # this process may have stood still, not the robots
-            server.end_without(waiting, f"silent for {patience:g} s")
-        else:
-            server.check_link()
-            server.end_without(waiting - bus.members_at(HERE), "gone")
-    return {name: box.latest[name] for name in server.plant.names if box.tick_of(name) == tick}
+    deadline = monotonic() + patience
+    # The last to get its state answers last: once it has, the others have too, and are not waited
+    # for one by one.
+    for name in reversed(server.plant.names):
+        while (came := server.receive(name, tick, wait=True)) != NEWER:
+            if stopped() or server.time.end is not None:
+                return {}
+            if came == CLOSED:
+                server.end_without({name}, "gone")
+            elif monotonic() > deadline:
+                server.end_without({name}, f"silent for {patience:g} s")
+            elif came == NOTHING:
+                server.check_link()
+    return {name: box.latest[name] for name in server.plant.names}
 
 
 class TeamPace:
@@ -135,6 +140,10 @@ class TeamPace:
         self._begun = monotonic_ns()
         return not stopped()
 
+    def wait_within(self, share: float) -> None:
+        """Wait until a share of a tick has passed since the present one began."""
+        sleep(1e-9 * (self._begun + share * _TICK_NS - monotonic_ns()))
+
     def wait(self) -> float:
         """Wait until the next tick begins; how late it does, s."""
         self._tick += 1
@@ -163,26 +172,27 @@ def run_realtime(
     end: End | None = None
     while end is None and not stopped():
         server.publish()
-        deadlines.note_lateness(rate.wait())  # meanwhile the agents answer
-        for packet in server.bus.drain():
-            server.take(*packet, oldest=0)
+        rate.wait_within(_DUE)  # meanwhile the agents answer
+        for name in names:
+            _take_commands(server, name)
         if server.plant.tick % SAMPLE_MS == 0:
-            _check_others(server)
+            server.check_link()
+            server.time.look(server.bus.members_at(HERE), server.plant.tick)
         end = server.step(_choose_commands(server, timeouts, deadlines))
         if server.plant.tick % PERIOD_MS == 0 or end is not None:
             server.publish_status(deadlines.status(server.plant.tick, rate.overruns))
+        deadlines.note_lateness(rate.wait())
     code, detail = end or TOLD_TO_STOP
     late = deadlines.describe_late()
     return End(code, f"{detail}; late ticks: {late}; overruns of the world: {rate.overruns}")
 
 
-def _check_others(server: PlantServer) -> None:
-    """See whether the agents, the other plants and the link to the router are still there."""
-    server.check_link()
-    present = server.bus.members_at(HERE)
-    if not server.plant.is_robot:  # a bridge sees to its robot itself
-        server.end_without(set(server.plant.names) - present, "gone")
-    server.time.look(present, server.plant.tick)
+def _take_commands(server: PlantServer, name: str) -> None:
+    """Take in what has come of a robot; a bridge sees itself to one whose agent is gone."""
+    while (came := server.receive(name, 0, wait=False)) not in (NOTHING, CLOSED):
+        pass
+    if came == CLOSED and not server.plant.is_robot:
+        server.end_without({name}, "gone")
 
 
 def _choose_commands(

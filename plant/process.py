@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import nullcontext
+from contextlib import closing, nullcontext
 from typing import Final
 
 from quadriga.plant.loops import TeamPace, run_lockstep, run_realtime
@@ -72,37 +72,47 @@ def run(
     with Bus.open(config.bus, team, plant_name(robot), stopped) as bus:
         with interruptible(stopped):
             server = PlantServer(config, plant, bus, robot)
-        for key in server.keys:
+        for key in sorted(server.time.keys):
             bus.subscribe(key)
         server.requests = subscribe_requests(bus)
         if plant.is_robot:
             estops = subscribe_requests(bus)
             plant.listen(lambda: find_estop(estops()), server.take_event)
         me = ProcessInfo(bus, config)
-        if not join(bus, config, stopped, me):
-            return
-        pace = TeamPace(bus, config, me) if robot and realtime else None
-        end_collection()
-        take_priority(config.runtime.priority)
-        try:
-            if not _start(server, pace, stopped):
-                end = TOLD_TO_STOP
-            elif realtime:
-                end = run_realtime(server, stopped, pace)
-            else:
-                end = run_lockstep(server, stopped)
-            if end.code == codes.COMMAND_LOST and _is_stopped_soon(stopped):
-                end, server.time.end = TOLD_TO_STOP, None
-            if server.time.drives:
-                server.announce(end.code, "", end.detail)
-        except Exception as error:
-            if server.time.drives:  # then the others need not find out by themselves
-                server.announce(codes.PLANT_FAILED, "", f"{type(error).__name__}: {error}")
-            raise
-        finally:
-            plant.finish()
-            leave_priority()
+        with closing(server.link):
+            server.link.open()
+            if not join(bus, config, stopped, me):
+                return
+            pace = TeamPace(bus, config, me) if robot and realtime else None
+            _walk(server, pace, stopped)
     _check_end(server.time.end, team, plant.tick)
+
+
+def _walk(server: PlantServer, pace: TeamPace | None, stopped: Callable[[], bool]) -> None:
+    """Start the team, walk, and tell everybody why it is over."""
+    end_collection()
+    take_priority(server.config.runtime.priority)
+    try:
+        if not _start(server, pace, stopped):
+            end = TOLD_TO_STOP
+        elif server.config.world.mode == "realtime":
+            end = run_realtime(server, stopped, pace)
+        else:
+            end = run_lockstep(server, stopped)
+        if end.code == codes.COMMAND_LOST and _is_stopped_soon(stopped):
+            end, server.time.end = TOLD_TO_STOP, None
+        server.publish_batch()
+        if server.time.drives:
+            server.announce(end.code, "", end.detail)
+        server.link.close(end.code)
+    except Exception as error:
+        if server.time.drives:  # then the others need not find out by themselves
+            server.announce(codes.PLANT_FAILED, "", f"{type(error).__name__}: {error}")
+        server.link.close(codes.PLANT_FAILED)
+        raise
+    finally:
+        server.plant.finish()
+        leave_priority()
 
 
 def _is_stopped_soon(stopped: Callable[[], bool]) -> bool:

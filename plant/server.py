@@ -1,4 +1,4 @@
-"""The plant on the bus: what lock-step and real time share."""
+"""The plant between its link and the bus: what lock-step and real time share."""
 
 from __future__ import annotations
 
@@ -18,6 +18,10 @@ from quadriga.shared.codec import encode, truncate_text
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import periods
 from quadriga.shared.errors import ConfigError
+from quadriga.shared.link.connections import CLOSED
+from quadriga.shared.link.packets import COMMAND
+from quadriga.shared.link.plant_end import PlantEnd
+from quadriga.shared.link.ticks import TickBatch
 from quadriga.shared.members import plant_name
 from quadriga.shared.messages import (
     Clock,
@@ -27,15 +31,19 @@ from quadriga.shared.messages import (
     Message,
     Reset,
     SafeStop,
+    State,
     Status,
     format_event,
 )
 from quadriga.shared.robots.conventions import robot_names
-from quadriga.shared.topics import CLOCK, EVENT, POSTURE, STATE, STATUS, TRUTH
+from quadriga.shared.runtime.clock import monotonic
+from quadriga.shared.topics import CLOCK, EVENT, STATUS, TICKS, TICKS_MS, TRUTH
 
 FALL_LINGER_MS: Final = 1000  # world time that is still shown after the first simulated fall
 # World time in which a team that has been asked to stop slows down, comes to stand and settles.
 STOP_LINGER_MS: Final = 2000
+NEWER: Final = 1  # what has come of a robot: a command that counts
+REFUSED: Final = 2  # one that does not
 _ANSWER_MS: Final = 100  # least time between two answers to an emergency stop that is in force
 
 
@@ -49,36 +57,34 @@ class PlantServer:
         robot: the robot that it is the plant of; "": of all.
 
     Attributes:
+        link: to the agents.
         time: this plant's part in the team's time.
         requests: gives what people have asked for since it was called last. A bridge sees to an
             emergency stop itself.
         commands: the newest command of every robot of the plant.
-        keys: what to subscribe to.
     """
 
     def __init__(self, config: Config, plant: Plant, bus: Bus, robot: str = "") -> None:
         team, realtime = config.team.name, config.world.mode == "realtime"
         self.config, self.plant, self.bus = config, plant, bus
         self.time = TeamTime(config, robot)
-        self.commands = CommandBox(team, plant.names, config.robot)
-        self.keys = tuple(sorted({*self.time.keys, *self.commands.robots}))
+        self.link = PlantEnd(config, plant.names, bus)
+        self.commands = CommandBox(config.robot)
         self.requests: Callable[[], Sequence[Message]] = tuple
         self._estopped = -1  # tick of the last answer to the emergency stop in force; −1: none is
         self._stop = ""  # why somebody has asked the team to stop, and the walk to end
         # What is said may come twice; a release may end no stop that was pressed meanwhile.
         self._heard: dict[type[Message], Message] = {}
-        self._put_state = {
-            name: bus.publisher(STATE.key(team, name), droppable=realtime) for name in plant.names
-        }
-        self._put_posture = {
-            name: bus.publisher(POSTURE.key(team, name), droppable=True) for name in plant.names
-        }
-        self._put_truth = bus.publisher(TRUTH.key(team), droppable=realtime)
-        self._put_clock = bus.publisher(CLOCK.key(team), droppable=realtime)
-        self._put_status = bus.publisher(STATUS.key(team, plant_name(robot)), droppable=True)
+        self._batch = TickBatch(plant.names, TICKS_MS)
+        self._taken = list[tuple[str, Command, float]]()  # and when, not in the batch yet
+        self._put_ticks = bus.publisher(TICKS.key(team, plant_name(robot)), waits=not realtime)
+        self._put_truth = bus.publisher(TRUTH.key(team), waits=not realtime)
+        self._put_clock = bus.publisher(CLOCK.key(team), waits=not realtime)
+        self._put_status = bus.publisher(STATUS.key(team, plant_name(robot)), waits=False)
         # The last one has all leave: in lock-step it comes after all else. In real time events wait
         # for nobody, and are not what gets lost when somebody is slow.
-        self._put_event = bus.publisher(EVENT.key(team), urgent=realtime)
+        event = EVENT.key(team)
+        self._put_event = bus.urgent_publisher(event) if realtime else bus.publisher(event)
         self._periods = periods(config)
         self._last_tick = round(config.world.duration * 1000)
         self._fallen: set[str] = set()
@@ -87,41 +93,67 @@ class PlantServer:
         self._realtime = realtime
 
     def publish(self) -> None:
-        """Send the present tick's clock and truth, when due, and every robot's state.
+        """Send every robot's state of the present tick, its clock and its truth, when due.
 
         The truth is the whole team's: a plant of one robot among several does not know it.
         """
         plant, tick = self.plant, self.plant.tick
-        # What has come before the states of this tick are out: no command of this tick can be among
-        # it. Taken in later, a forged one would come before the robot's own.
+        # States come first: agents wait for them, and in real time they have half a millisecond.
+        states = plant.states()
+        for name, state in states.items():
+            self.link.send(name, state)
+        self._published, now = tick, monotonic()
+        self._gather(states, now)
         for packet in self.bus.drain():
-            self.take(*packet, 0 if self._realtime else tick)
-        # States come first: agents wait for them, and in real time they have a millisecond.
-        states = dict[str, bytes]()
-        for name, state in plant.states().items():
-            states[name] = encode(state)
-            self._put_state[name](states[name])
+            self.time.take(*packet, tick)
         if self.time.drives and tick % self._periods[CLOCK.name] == 0:
             self._put_clock(encode(Clock(tick, tick * 1_000_000)))
         if self.time.alone and tick % self._periods[TRUTH.name] == 0:
             truth = plant.truth()
             if truth is not None:
                 self._put_truth(encode(truth))
-        if tick % POSTURE.period_ms == 0:
-            for name, payload in states.items():
-                self._put_posture[name](payload)
-        self._published = tick
+        if tick % TICKS_MS == 0 or self._batch.is_full:
+            self.publish_batch()
         plant.settle()
 
-    def take(self, key: str, payload: bytes, oldest: int) -> str:
-        """Take in a packet; the robot's name if its command is now newer.
+    def _gather(self, states: Mapping[str, State], now: float) -> None:
+        """Put what was taken in, and states that were sent now, into the batch."""
+        for name, command, at in self._taken:
+            self._batch.add_command(name, command.tick, command.row, at)
+        self._taken.clear()
+        for name, state in states.items():
+            self._batch.add_state(name, state.tick, state.row, now)
+
+    def publish_batch(self) -> None:
+        """Tell who records or looks on what has gone over the link since the last time."""
+        self._gather({}, 0.0)
+        batch = self._batch.take(self.plant.tick)
+        if batch is not None:
+            self._put_ticks(encode(batch))
+
+    def receive(self, robot: str, oldest: int, *, wait: bool) -> int:
+        """Take in a robot's next command.
 
         A command of a tick whose states are not out yet, or of before tick `oldest`, is refused.
+
+        Returns:
+            `NEWER`, or `REFUSED` of one that does not count; `NOTHING` if none comes, `CLOSED` if
+            the agent is gone.
         """
-        if key not in self.time.keys:
-            return self.commands.take(key, payload, tick=self._published, oldest=oldest)
-        self.time.take(key, payload, self.plant.tick)
-        return ""
+        link, box = self.link, self.commands
+        size = link.receive(robot, wait=wait)
+        if size <= CLOSED:
+            return size
+        got = link.received
+        fault = got.parse(size)
+        if fault or got.kind != COMMAND:
+            box.refuse(robot, fault or f"a packet of kind {got.kind}, expected a command")
+            return REFUSED
+        command = Command.from_row(got.tick, got.stamp_ns, got.command.copy())
+        if not box.take(robot, command, self._published, oldest):
+            return REFUSED
+        self._taken.append((robot, command, monotonic()))
+        return NEWER
 
     def check_link(self) -> None:
         """End this plant's walk if its link to the router is gone: nobody hears it any more."""

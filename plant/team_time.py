@@ -19,7 +19,7 @@ from quadriga.shared.errors import MessageError
 from quadriga.shared.members import plant_name
 from quadriga.shared.messages import Event
 from quadriga.shared.robots.conventions import robot_names
-from quadriga.shared.topics import CLOCK, EVENT, STATE
+from quadriga.shared.topics import CLOCK, EVENT, TICKS
 
 _LOOKS: Final = 10  # one each sample: the announced end may come after who drives time has left
 _JUMP_MS: Final = 5000  # no plant of a team that still walks is so far ahead
@@ -28,7 +28,7 @@ _JUMP_MS: Final = 5000  # no plant of a team that still walks is so far ahead
 class TeamTime:
     """One plant's part in the team's time.
 
-    The first robot's plant hears the states of the others' robots and what happens there; any
+    The first robot's plant hears the batches of ticks of the others and what happens there; any
     other plant hears the clock, and the announced end of the walk.
 
     Args:
@@ -48,9 +48,8 @@ class TeamTime:
         self.alone, self.drives = not robot, robot in ("", first)
         self._plants: dict[str, str] = {}  # on which this one depends, by the key that is heard
         if robot:
-            heard = {STATE.key(team, name): name for name in others}
-            heard = heard if self.drives else {CLOCK.key(team): first}
-            self._plants = {key: plant_name(name) for key, name in heard.items()}
+            heard = {TICKS.key(team, plant_name(name)): plant_name(name) for name in others}
+            self._plants = heard if self.drives else {CLOCK.key(team): plant_name(first)}
         self._event, self._others = EVENT.key(team), frozenset(others)
         self.keys = frozenset([*self._plants, self._event] if robot else ())
         self.end: End | None = None

@@ -86,7 +86,7 @@ def decode(payload: bytes, kind: type[M]) -> M:
         missing = sorted(names - body.keys())
         unknown = sorted(str(key) for key in body.keys() - names)
         raise _error(kind, f"{missing=} {unknown=}", "exactly the fields of the type")
-    values: dict[str, Any] = dict(_read_arrays(kind, layout.shapes, body))
+    values: dict[str, Any] = dict(_read_arrays(kind, layout, body))
     for name, of in layout.plain.items():
         values[name] = _check(kind, name, *of, body[name])
     return kind(**values)
@@ -129,15 +129,18 @@ class _Layout:
     Attributes:
         shapes: of arrays, by name.
         plain: of all other fields: their type, and that of a map's values.
+        infinite: names of arrays that may hold what is not finite.
         flat: of a type whose numbers are all in one row.
     """
 
     def __init__(self, kind: type[Message]) -> None:
         self.shapes: dict[str, tuple[int | str, ...]] = {}
         self.plain: dict[str, tuple[type, type]] = {}
+        self.infinite = set[str]()
         for item in fields(kind):
             if "shape" in item.metadata:
                 self.shapes[item.name] = item.metadata["shape"]
+                self.infinite |= set() if item.metadata["finite"] else {item.name}
             else:
                 self.plain[item.name] = item.metadata["kind"], int if "int" in item.type else float
         self.flat = _FlatLayout(kind) if issubclass(kind, Flat) else None
@@ -215,13 +218,11 @@ def _read_unsigned(payload: bytes, at: int) -> tuple[int, int]:
     return int.from_bytes(payload[at + 1 : end], "big"), end
 
 
-def _read_arrays(
-    kind: type[Message], shapes: Mapping[str, Any], body: Mapping[str, Any]
-) -> dict[str, Array]:
+def _read_arrays(kind: type[Message], layout: _Layout, body: Mapping[str, Any]) -> dict[str, Array]:
     """The arrays of a message; lengths of the same letter must be the same."""
     lengths: dict[str, int] = {}
     arrays: dict[str, Array] = {}
-    for name, shape in shapes.items():
+    for name, shape in layout.shapes.items():
         raw = body[name]
         if not isinstance(raw, bytes):
             raise _error(kind, type(raw).__name__, "float64 bytes", name=name)
@@ -231,7 +232,7 @@ def _read_arrays(
         if rest or count != expected:
             raise _error(kind, f"{len(raw)} bytes", f"float64 of shape {shape}", name=name)
         array = np.frombuffer(raw, _FLOAT64)
-        if not _all_finite(array):
+        if name not in layout.infinite and not _all_finite(array):
             cause = "a failed sensor or solver"
             raise _error(kind, "NaN or infinity", "finite numbers", cause, name)
         arrays[name] = array.reshape([count if isinstance(d, str) else d for d in shape])

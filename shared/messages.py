@@ -32,13 +32,16 @@ ONE: Final = ("",)  # a single number, called as its field is
 F = TypeVar("F", bound="Flat")
 
 
-def array(*shape: int | str, entries: tuple[str, ...], unit: str, frame: str = "-") -> Any:
+def array(
+    *shape: int | str, entries: tuple[str, ...], unit: str, frame: str = "-", finite: bool = True
+) -> Any:
     """Declare an array field of the wire: its shape, unit and frame.
 
     `entries` are the names of its numbers: of one robot, yoke or sample if it is of several; () of
-    a list of any length.
+    a list of any length. With `finite` NaN and infinity are errors.
     """
-    return field(metadata={"shape": shape, "entries": entries, "unit": unit, "frame": frame})
+    meta = {"shape": shape, "entries": entries, "unit": unit, "frame": frame, "finite": finite}
+    return field(metadata=meta)
 
 
 def plain(kind: type, doc: str) -> Any:
@@ -76,6 +79,15 @@ class Flat(Message):
                 got = f"{type(self).__name__}.{name}: got shape {np.shape(parts[name])}"
                 raise ValueError(f"{got}, expected {(cut.stop - cut.start,)}")
         self.row = np.concatenate([parts[name] for name in self.CUTS], dtype=float)
+
+    @classmethod
+    def entries(cls) -> tuple[str, ...]:
+        """Names of the numbers of a row."""
+        return tuple(
+            f"{item.name}.{entry}"
+            for item in fields(cls)
+            for entry in item.metadata.get("entries", ())
+        )
 
     @classmethod
     def from_row(cls, tick: int, stamp_ns: int, row: Array) -> Self:
@@ -137,6 +149,34 @@ class Command(Flat):
     v_des: Array = array(12, entries=JOINTS, unit="rad/s", frame="joint")
     kp: Array = array(12, entries=JOINTS, unit="N·m/rad", frame="joint")
     kd: Array = array(12, entries=JOINTS, unit="N·m·s/rad", frame="joint")
+
+
+_GATHERED: Final = ("robot", "tick", "age")  # in front of each row of `Ticks`
+
+
+@record
+class Ticks(Message):
+    """States and commands of some ticks, as they went over a plant link, for who looks on.
+
+    In front of each row: the robot's place in `robots`, the tick, and how long ago it was sent, or
+    taken in, when this was sent.
+    """
+
+    robots: tuple[str, ...] = plain(list, "names of the robots")
+    states: Array = array(
+        "s",
+        len(_GATHERED) + max(cut.stop for cut in State.CUTS.values()),
+        entries=(*_GATHERED, *State.entries()),
+        unit="1, ms, s, then as in State",
+        finite=False,
+    )
+    commands: Array = array(
+        "c",
+        len(_GATHERED) + max(cut.stop for cut in Command.CUTS.values()),
+        entries=(*_GATHERED, *Command.entries()),
+        unit="1, ms, s, then as in Command",
+        finite=False,
+    )
 
 
 @record

@@ -13,6 +13,8 @@ from quadriga.shared.members import AGENT, LAUNCHER, OPERATOR, PLANNER, SIM
 CONFIGURED: Final = -1  # a time that the configuration says: see `quadriga.shared.config.timing`
 SAMPLE_MS: Final = 10  # one sample of u and y: forces are means over it, outputs taken at its end
 REFERENCE_EPOCH_MS: Final = 100  # the operator speaks at multiples of this
+CLOCK_MS: Final = 50  # so often the plant that drives it tells the time
+TICKS_MS: Final = 10  # so much of what goes over a plant link is told at once
 STATUS_MS: Final = 100  # so often an agent gives account of itself in lock-step
 RECEIVED: Final = "received"  # ends the key of the question whether all before it has arrived
 
@@ -55,7 +57,7 @@ class Topic:
 
 
 STATE: Final = Topic(
-    "state", msg.State, (SIM,), (AGENT, SIM), per_robot=True, period_ms=1, max_age_ms=20
+    "state", msg.State, (SIM,), (AGENT,), per_robot=True, period_ms=1, max_age_ms=20
 )
 COMMAND: Final = Topic(
     "command", msg.Command, (AGENT,), (SIM,), per_robot=True, period_ms=1, max_age_ms=20
@@ -105,16 +107,18 @@ INJECTED: Final = Topic("injected", msg.Event, (LAUNCHER,), (), period_ms=0, rep
 # Not recorded: the states of every tick tell the same.
 CLOCK: Final = Topic(
     "clock", msg.Clock, (SIM,), (OPERATOR, LAUNCHER, *_SPEAKERS, SIM),
-    period_ms=SAMPLE_MS, recorded=False,
+    period_ms=CLOCK_MS, recorded=False,
 )  # fmt: skip
-# For who watches: states of some ticks alone. Not recorded either.
-POSTURE: Final = Topic(
-    "posture", msg.State, (SIM,), (), per_robot=True, period_ms=SAMPLE_MS, recorded=False
-)
+# What went over the plant links, by plants, and by agents whose plant is gone. Not recorded: each
+# state and command in it is, under a key of its own.
+TICKS: Final = Topic(
+    "ticks", msg.Ticks, (SIM, AGENT), (SIM,), per_robot=True, period_ms=TICKS_MS, recorded=False,
+    repeats=True,
+)  # fmt: skip
 
 TABLE: Final = (
     STATE, COMMAND, MEASUREMENT, PLAN, STATUS, INPUTS, REFERENCE, *REQUESTS, LIVE_FAULT, TRUTH,
-    EVENT, AGENT_EVENT, INJECTED, CLOCK, POSTURE,
+    EVENT, AGENT_EVENT, INJECTED, CLOCK, TICKS,
 )  # fmt: skip
 _BY_NAME: Final = {topic.name: topic for topic in TABLE}
 

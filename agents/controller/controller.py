@@ -50,17 +50,24 @@ def control(
     Returns:
         The state to remember, with what the QP was asked for, and the QP with its answer.
     """
-    asked, row = np.empty(COMMAND.itemsize // 8), np.empty(len(state.row))
-    vx, vy, wz, height, asked[:N_FORCES], *rest = command
-    # At once: each number that numpy is given by itself costs as much as this.
-    _NUMBERS.pack_into(asked, 8 * N_FORCES, vx, vy, wz, height, *rest, new_sample)  # type: ignore[arg-type]
-    qp = np.empty(QP.itemsize // 8)
-    free = _control(state.row, row, asked, gains, qp)
+    qp, row = np.empty(QP.itemsize // 8), np.empty(len(state.row))
+    free = control_rows(state.row, row, command_row(command, new_sample=new_sample), gains, qp)
     return RobotState(row), solve_qp(qp, free)
 
 
+def command_row(command: TrunkCommand, *, new_sample: bool) -> Array:
+    """The row of `COMMAND` that compiled code takes."""
+    asked = np.empty(COMMAND.itemsize // 8)
+    vx, vy, wz, height, asked[:N_FORCES], *rest = command
+    # At once: each number that numpy is given by itself costs as much as this.
+    _NUMBERS.pack_into(asked, 8 * N_FORCES, vx, vy, wz, height, *rest, new_sample)  # type: ignore[arg-type]
+    return asked
+
+
 @compiled
-def _control(before: Array, after: Array, command_row: Array, gains_row: Array, qp: Array) -> bool:
+def control_rows(
+    before: Array, after: Array, command_row: Array, gains_row: Array, qp: Array
+) -> bool:
     """Fill the rows `after` and `qp`; whether no limit of the QP is active."""
     after[:] = before
     state, gains = after.view(ROBOT_STATE)[0], gains_row.view(GAINS)[0]

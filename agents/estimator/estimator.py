@@ -6,6 +6,8 @@ contacts, load.
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
 from quadriga.agents.estimator.contact import update_contacts
@@ -27,7 +29,7 @@ from quadriga.shared.runtime.jit import compiled
 _Q_JOINT, _V_JOINT, _TAU_JOINT = (State.CUTS[k] for k in ("q_joint", "v_joint", "tau_joint"))
 _QUAT, _GYRO, _ACCEL = (State.CUTS[k] for k in ("imu_quat_wxyz", "imu_gyro", "imu_accel"))
 _FOOT_FORCE = State.CUTS["foot_force"]
-_ESTIMATED = np.empty(0)  # for the truth that is not known
+NO_TRUTH: Final = np.empty(0)  # for the truth that is not known
 
 
 def estimate(
@@ -50,7 +52,7 @@ def estimate(
     """
     row = np.empty(ROBOT_STATE.itemsize // 8)
     row0 = standing_state(sensors, gains).row if before is None else before.row
-    _estimate(row0, row, sensors.row, schedule, dt, gains, _ESTIMATED if truth is None else truth)
+    estimate_rows(row0, row, sensors.row, schedule, dt, gains, NO_TRUTH if truth is None else truth)
     if before is None:  # feet are anchored where they are, the heading is kept
         state = row.view(ROBOT_STATE)[0]
         state.swing_start = state.foot_goal = state.p_foot
@@ -80,7 +82,7 @@ def truth_row(truth: Truth, robot: str) -> Array:
 
 
 @compiled
-def _estimate(
+def estimate_rows(
     before: Array,
     after: Array,
     readings: Array,

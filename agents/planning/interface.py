@@ -13,6 +13,7 @@ from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.record import record
 
 S = TypeVar("S")
+NEVER_MS: Final = 1 << 40  # of what is never due, some thousand years
 REFUSED: Final = "refused_by_planner"  # counter: messages whose content cannot be meant
 
 
@@ -106,6 +107,18 @@ class PlanningInterface(Protocol[S]):
     def peers(self) -> tuple[str, ...]:
         """Robots whose plans and measurements it takes in."""
         return ()
+
+    @property
+    def effect_ms(self) -> int:
+        """Ticks that pass at least from a step to the start of what it plans; 0: it is at once."""
+        return 0
+
+    def next_due(self, tick: int) -> int:
+        """The next tick at which `step` does something although nothing has come in since.
+
+        Of others it changes neither its state nor what the robot does.
+        """
+        return tick + 1
 
     def initial(self) -> S:
         """Its state before the first tick."""

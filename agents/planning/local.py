@@ -79,6 +79,16 @@ class LocalPlanning:
         """Robots whose plans and measurements it takes in."""
         return self._neighbours.names
 
+    @property
+    def effect_ms(self) -> int:
+        """The configured latency."""
+        return self._config.planner.latency_ms
+
+    def next_due(self, tick: int) -> int:
+        """When the present exchange is over, or the planning step."""
+        step, exchange, _ = self._place(tick)
+        return self._step_ms * step + min(self._exchange_ms * (exchange + 1), self._step_ms)
+
     def initial(self) -> LocalState:
         """No message, no sample, no plan."""
         return LocalState(self._neighbours.initial())

@@ -10,7 +10,12 @@ from typing import Any
 import quadriga.agents.planning.local
 import quadriga.agents.planning.remote  # noqa: F401
 from quadriga.agents.planner.team import Collected
-from quadriga.agents.planning.interface import PlanningInputs, PlanningInterface, PlanningOutputs
+from quadriga.agents.planning.interface import (
+    NEVER_MS,
+    PlanningInputs,
+    PlanningInterface,
+    PlanningOutputs,
+)
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config
 from quadriga.shared.planner_kinds import find_kind, load_builder
@@ -20,6 +25,12 @@ class NominalPlanning(PlanningInterface[None]):
     """No planning at all: the robot walks on nominal forces and follows the operator."""
 
     def __init__(self, *_: object) -> None: ...
+
+    effect_ms = NEVER_MS
+
+    def next_due(self, tick: int) -> int:
+        """Never."""
+        return tick + NEVER_MS
 
     def initial(self) -> None:
         """No state."""

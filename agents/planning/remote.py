@@ -50,6 +50,10 @@ class RemotePlanning(PlanningInterface[RemoteState]):
         self._step_ms, self._latency = step_ms(config), central_latency(config)
         self._first_step = first_step(config)
 
+    def next_due(self, tick: int) -> int:
+        """When the next plan is due."""
+        return tick + self._step_ms - (tick - self._latency) % self._step_ms
+
     def initial(self) -> RemoteState:
         """No plan yet."""
         return RemoteState()

@@ -58,7 +58,7 @@ def _await_link(bus: Bus, endpoint: str) -> None:
 
 def _flood(bus: Bus) -> None:
     put, deadline = (
-        bus.publisher(f"{bus.team}/{OBSERVER}/flood", droppable=True),
+        bus.publisher(f"{bus.team}/{OBSERVER}/flood", waits=False),
         monotonic() + FLOOD_S,
     )
     while monotonic() < deadline:

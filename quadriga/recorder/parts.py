@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
+from typing import Final, Self
 
 from quadriga.shared.errors import RecordingError
+from quadriga.shared.messages import Message
 from quadriga.shared.recording.quota import Quota
 from quadriga.shared.recording.reader import name_of
 from quadriga.shared.recording.ticks import lost_by_key
 from quadriga.shared.recording.writer import CHUNK_KIB, MESSAGE_SIZE, RecordingWriter
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.topics import STATE
+
+_LARGEST: Final = 768  # bytes of a state or a command in a file, at most
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,14 +73,19 @@ class Parts:
 
     def write(self, key: str, payload: bytes, log_time_ns: int) -> None:
         """Append one message as sent."""
-        size = self._limits.size
-        if (
-            size
-            and self._writer.messages
-            and self._writer.size + len(payload) + MESSAGE_SIZE > size
-        ):
-            self._begin_next()
+        self._make_room(len(payload) + MESSAGE_SIZE)
         self._writer.write(key, payload, log_time_ns)
+
+    def write_all(self, messages: Sequence[tuple[str, Message, int]]) -> None:
+        """Append messages, each with its key and its log time."""
+        self._make_room(_LARGEST * len(messages))
+        self._writer.write_all(messages)
+
+    def _make_room(self, size: int) -> None:
+        """Begin a new file where so many bytes more would be too many."""
+        most = self._limits.size
+        if most and self._writer.messages and self._writer.size + size > most:
+            self._begin_next()
 
     def note(self, name: str, values: Mapping[str, str]) -> None:
         """Write down something about the recording in the file that is open."""
@@ -114,10 +122,15 @@ class Parts:
         """Tick of the first message of each key."""
         return self._first_of_part() | self._first
 
+    @property
+    def ticks(self) -> dict[str, int]:
+        """Tick of the newest message of each key."""
+        return {**self._last, **{key: track.last for key, track in self._writer.tracks.items()}}
+
     def last_tick(self) -> int:
         """Of the newest state of any robot; −1 without one."""
-        ticks = {**self._last, **{key: track.last for key, track in self._writer.tracks.items()}}
-        return max((tick for key, tick in ticks.items() if name_of(key) == STATE.name), default=-1)
+        states = (tick for key, tick in self.ticks.items() if name_of(key) == STATE.name)
+        return max(states, default=-1)
 
     def __enter__(self) -> Self:
         return self

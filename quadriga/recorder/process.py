@@ -24,7 +24,7 @@ from quadriga.shared.recording.quota import Quota
 from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.runtime.scheduling import precede_ordinary, take_priority
 from quadriga.shared.runtime.signals import stop_on_signals
-from quadriga.shared.topics import EVENT
+from quadriga.shared.topics import EVENT, TICKS
 
 _HEARD: Final = 3.0  # s wall, in which a team that walks is heard of
 _LOOK: Final = 0.02  # s wall between two looks for it
@@ -129,6 +129,8 @@ def _schedule(config: Config) -> None:
 def _subscribe(bus: Bus, keys: KeyFilter) -> None:
     """Hear what is recorded, and the events, which announce the end of the walk."""
     bus.subscribe(keys.expression)
+    if keys.expression != f"{bus.team}/**":  # states and commands are in batches of ticks
+        bus.subscribe(TICKS.key(bus.team, "*"))
     event = EVENT.key(bus.team)
     if not keys(event):
         bus.subscribe(event)

@@ -14,6 +14,7 @@ from quadriga.shared.bus.session import Bus
 from quadriga.shared.codec import decode
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
+from quadriga.shared.link.ticks import gathered
 from quadriga.shared.members import PLANNER, plant_name
 from quadriga.shared.messages import Event
 from quadriga.shared.recording.reader import name_of
@@ -21,7 +22,7 @@ from quadriga.shared.recording.ticks import SkippedTicks
 from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.runtime.clock import log_ns, monotonic, sleep, wall_ns
 from quadriga.shared.runtime.scheduling import take_priority
-from quadriga.shared.topics import EVENT, find_topic
+from quadriga.shared.topics import EVENT, TICKS, find_topic
 
 FLUSH: Final = 0.05  # s wall between two flushes: a kill loses what has come since the last
 QUIET: Final = 0.2  # s wall without a message after which nothing more is under way
@@ -29,6 +30,7 @@ DRAIN_LIMIT: Final = 5.0  # s wall, longest drain of a team that does not fall s
 _GATHER: Final = 0.004  # s wall, pause between looks at the inbox: one wake-up for many messages
 _SLICE: Final = 500  # messages that are written at most before a look at the clock
 _LOOK: Final = 1.0  # s wall after which a late recorder reports what it has
+_TICKS: Final = f"/{TICKS.name}"
 _NAMED: Final = 10  # robots of another team that are named; whoever publishes names them
 
 
@@ -60,7 +62,7 @@ class Session:
         self._ended = self._seen = self._announced = self._drops = False
         self._hurries = config.world.mode == "lockstep"  # then it does from the start
         self._passed_over = SkippedTicks(config)
-        self._missed_ns = 0
+        self._missed_ns, self._robots = 0, frozenset(robot_names(config.team.robots))
 
     def record(self, *, late: bool, seen: bool) -> None:
         """Record until the end; a late recorder reports what it has once it knows.
@@ -138,6 +140,9 @@ class Session:
         every = recorded.all
         for begin in range(0, len(packets), _SLICE):
             for key, payload in packets[begin : begin + _SLICE]:
+                if key.endswith(_TICKS):
+                    self._write_ticks(key, payload, now)
+                    continue
                 if every or recorded(key):
                     write(key, payload, now)
                 if key == self._event_key:
@@ -147,6 +152,22 @@ class Session:
             self._tend()
         self._tend()
         return bool(packets)
+
+    def _write_ticks(self, key: str, payload: bytes, now: int) -> None:
+        """Write each state and command of a batch under its own key.
+
+        What an agent has gathered counts only where its plant was killed before it told the same.
+        """
+        team, robot = self._bus.team, find_topic(key)[1]
+        told = self._parts.ticks if robot in self._robots else {}
+        items = ((item.key(team), item.message, item.age) for item in gathered(payload))
+        self._parts.write_all(
+            [
+                (of, message, now - round(1e9 * age))
+                for of, message, age in items
+                if self._keys(of) and message.tick > told.get(of, -1)
+            ]
+        )
 
     def _note_event(self, payload: bytes) -> None:
         with suppress(MessageError):

@@ -13,11 +13,13 @@ from typing import Final
 from quadriga.recordings.key_patterns import KeyPattern, key_patterns
 from quadriga.recordings.readable import open_readable
 from quadriga.shared.bus.session import POLL, Bus
-from quadriga.shared.codec import envelope
+from quadriga.shared.codec import encode, envelope
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import RecordingError
+from quadriga.shared.link.ticks import gathered
 from quadriga.shared.recording.reader import ChunkEntry
 from quadriga.shared.runtime.clock import log_ns, monotonic
+from quadriga.shared.topics import TICKS
 
 _PATIENCE: Final = 3.0  # s wall without a message after which a listener is shown where it listens
 
@@ -62,7 +64,10 @@ def entries_from_bus(
     silent = True
     patterns = key_patterns(keys, team, "KEY")
     with Bus.open(config.bus, team, f"{name}-{os.getpid()}", stopped) as bus:
-        bus.subscribe(patterns[0].expression if len(patterns) == 1 else f"{team}/**")
+        expression = patterns[0].expression if len(patterns) == 1 else f"{team}/**"
+        bus.subscribe(expression)
+        if expression != f"{team}/**" and expression != (ticks := TICKS.key(team, "*")):
+            bus.subscribe(ticks)  # of which states and commands are taken out
         while not stopped():
             first = bus.get(POLL)
             if first is None:
@@ -76,6 +81,11 @@ def entries_from_bus(
                 if _matches(patterns, key):
                     head = envelope(payload)
                     yield ChunkEntry(key, -1 if head is None else head[0], now, payload)
+                if key.endswith(f"/{TICKS.name}"):
+                    for item in gathered(payload):
+                        if _matches(patterns, of := item.key(team)):
+                            at = now - round(1e9 * item.age)
+                            yield ChunkEntry(of, item.message.tick, at, encode(item.message))
 
 
 def _matches(patterns: Sequence[KeyPattern], key: str) -> bool:

@@ -14,18 +14,17 @@ from quadriga.doctor.watch_team import WalkEnd
 from quadriga.shared.bus.diagnostics import TeamView, processes
 from quadriga.shared.bus.discovery import ask, describe_process, view_of
 from quadriga.shared.bus.session import HERE, Arrival, Bus
-from quadriga.shared.codec import envelope
+from quadriga.shared.codec import encode, envelope
 from quadriga.shared.config.sections import Config
-from quadriga.shared.config.timing import periods
+from quadriga.shared.link.ticks import gathered
 from quadriga.shared.members import OBSERVER
 from quadriga.shared.runtime.clock import monotonic, monotonic_ns, sleep
 from quadriga.shared.runtime.process_use import read_use
-from quadriga.shared.topics import TABLE
+from quadriga.shared.topics import TABLE, TICKS
 from quadriga.status.gather import StatusFold
 from quadriga.status.judge import find_problems
 from quadriga.status.record import MachineUse, MemberStatus, TeamStatus
 
-_FAST_MS: Final = 10  # a topic with a shorter period costs who hears it a good part of a core
 _ASK_EVERY: Final = 5.0  # s between two questions, each of which costs every process an answer
 _LINK_TIMEOUT: Final = 3.0  # s, in which a link to those that are there has come about
 _PAUSE: Final = 0.05  # s between two looks at what has come
@@ -44,12 +43,8 @@ class TeamListener:
         self._config, self._bus = config, bus
         self._team = processes(config)
         self._fold, self._end = StatusFold(config), WalkEnd(bus)
-        fast = periods(config)
-        keys = {
-            topic.key(bus.team, "*")
-            for topic in TABLE
-            if every_topic or not 0 < fast[topic.name] < _FAST_MS
-        }
+        self._every_topic = every_topic
+        keys = {topic.key(bus.team, "*") for topic in TABLE if every_topic or topic is not TICKS}
         self._takes: list[Callable[[], list[Arrival]]] = [
             bus.collect(key) for key in sorted(keys) if not _is_covered(key, keys)
         ]
@@ -71,6 +66,10 @@ class TeamListener:
             for at_ns, key, payload in sorted(arrived, key=lambda arrival: arrival[0]):
                 head = envelope(payload)
                 self._fold.add(key, payload, -1 if head is None else head[0], at_ns)
+                for item in gathered(payload) if key.endswith(f"/{TICKS.name}") else ():
+                    sent_ns = at_ns - round(1e9 * item.age)
+                    of, tick = item.key(self._bus.team), item.message.tick
+                    self._fold.add(of, encode(item.message), tick, sent_ns)
 
     def look(self) -> TeamStatus:
         """How the team is now, by what was heard since the last look."""

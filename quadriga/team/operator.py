@@ -102,7 +102,7 @@ class _Operator:
         # In lock-step none may be lost. In real time one that stands still and hears nothing any
         # more, as a frozen recorder, would hold up the router, and so everybody else.
         realtime = config.world.mode == "realtime"
-        self._put = bus.publisher(REFERENCE.key(bus.team), droppable=realtime)
+        self._put = bus.publisher(REFERENCE.key(bus.team), waits=not realtime)
         self._bus, self._watch = bus, Liveness(bus, config)
         self._time = TeamTicks(bus, round(1000 * config.world.duration))
         controls.time = lambda: (self._time.tick, 1_000_000 * self._time.tick)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Final, Self
 
 import numpy as np
@@ -38,8 +39,12 @@ class WalkProgress:
     def __init__(self, config: Config, console: Console) -> None:
         self._config, self._console = config, console
         self._bus = Bus.open(config.bus, config.team.name, LAUNCHER)
+        team = config.team.name
         for topic in topics_for(LAUNCHER):
-            self._bus.subscribe(topic.key(config.team.name, "*"))
+            if topic not in (CLOCK, TRUTH):
+                self._bus.subscribe(topic.key(team, "*"))
+        self._clock = self._bus.keep_newest(CLOCK.key(team))
+        self._truth = self._bus.keep_newest(TRUTH.key(team))
         self._bar = build_progress(console, "{task.fields[text]}", hidden=False)
         self._task = self._bar.add_task("starting", total=config.world.duration, text="")
         self._begun = self._told = 0.0
@@ -51,22 +56,22 @@ class WalkProgress:
 
     def update(self) -> None:
         """Show what has arrived since the last call."""
-        clock = None
         for key, payload in self._bus.drain():
             try:
-                if key == CLOCK.key(self._bus.team):
-                    clock = decode(payload, Clock)
-                elif key == TRUTH.key(self._bus.team):
-                    velocity = decode(payload, Truth).base_vel.mean(axis=0)
-                    self._speed = f"{float(np.linalg.norm(velocity[:2])):.2f} m/s  "
-                elif key.endswith(f"/{STATUS.name}"):
+                if key.endswith(f"/{STATUS.name}"):
                     self._note_status(key.split("/")[1], decode(payload, Status))
                 else:
                     self._show_event(decode(payload, Event))
             except MessageError:
                 continue  # the recorder keeps it
+        with suppress(MessageError):
+            if (truth := self._truth()) is not None:
+                velocity = decode(truth, Truth).base_vel.mean(axis=0)
+                self._speed = f"{float(np.linalg.norm(velocity[:2])):.2f} m/s  "
+        clock = self._clock()
         if clock is not None:
-            self._show_time(clock.tick / 1000)
+            with suppress(MessageError):
+                self._show_time(decode(clock, Clock).tick / 1000)
         elif not self._begun:
             self._show_absent()
 

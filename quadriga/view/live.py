@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from typing import Final, NamedTuple
+from typing import Final
 
-from quadriga.shared.bus.ring_buffer import Newest
 from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.codec import decode
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
-from quadriga.shared.messages import Event, Status
+from quadriga.shared.link.ticks import gathered
+from quadriga.shared.messages import Event
 from quadriga.shared.runtime.clock import Rate, monotonic
 from quadriga.shared.topics import (
     AGENT_EVENT,
@@ -20,12 +20,11 @@ from quadriga.shared.topics import (
     INJECTED,
     MEASUREMENT,
     PLAN,
-    POSTURE,
     REFERENCE,
     STATE,
     STATUS,
+    TICKS,
     TRUTH,
-    Topic,
 )
 from quadriga.view.gather import Gatherer
 from quadriga.view.port import PageAddress, url_of
@@ -34,30 +33,15 @@ from quadriga.view.team_shape import TeamShape, build_team_shape
 from quadriga.view.traffic import Traffic
 from quadriga.view.viser_server import open_server
 
-_KEPT: Final = 64  # messages of a key that are kept between two looks
 _EVENTS: Final = 20  # that are remembered
 _QUIET_S: Final = 2.0  # without a message after which the heading says so
 _REPORT_S: Final = 1.0  # between two reports of the traffic
 _UNSEEN_S: Final = 0.15  # between two looks while nobody has the page open
 _POLITE: Final = 10  # added to the nice value: a team on the same machine comes first
-_NEWEST: Final = (POSTURE, TRUTH, PLAN, REFERENCE)  # of which the newest message is enough
-
-
-class _Source(NamedTuple):
-    """A key that is listened to."""
-
-    name: str
-    topic: Topic
-    robot: str
-    newest: Newest
 
 
 class _Feed:
     """What a team sends, taken in whenever somebody asks.
-
-    Each message that is fetched from Zenoh costs 20 µs, so the thousand states a second of each
-    robot and as many commands are not listened to: for a picture postures do, and how many there
-    were the agents tell in their statuses.
 
     Attributes:
         gatherer: has the newest of all.
@@ -68,46 +52,46 @@ class _Feed:
     def __init__(self, bus: Bus, shape: TeamShape, now: float) -> None:
         self.gatherer, self.traffic = Gatherer(shape), Traffic(now)
         self.happenings: list[tuple[int, str]] = []
-        per_robot = (POSTURE, MEASUREMENT, PLAN, STATUS, AGENT_EVENT)
+        per_robot = (MEASUREMENT, PLAN, STATUS, AGENT_EVENT)
         wanted = [(topic, "") for topic in (TRUTH, REFERENCE, EVENT, INJECTED)]
         wanted += [(topic, robot) for robot in shape.robots for topic in per_robot]
-        self._sources = [
-            _Source(key.partition("/")[2], topic, robot, bus.keep_newest(key, _KEPT))
-            for topic, robot in wanted
-            if (key := topic.key(bus.team, robot))
-        ]
+        self._topics = {topic.key(bus.team, robot): (topic, robot) for topic, robot in wanted}
+        told = [topic.key(bus.team, r) for topic in (STATE, COMMAND) for r in shape.robots]
+        for key in (*told, *self._topics):
+            self.traffic.note(_short(key), 0, -1, now)
+        self._take = bus.collect(*self._topics, TICKS.key(bus.team, "*"))
 
     def read(self, now: float) -> bool:
         """Take in what has come; whether anything has."""
-        any_came = False
-        for source in self._sources:
-            # Where robots are is summed up from their measurements only if nobody else knows.
-            newest_only = source.topic in _NEWEST or (
-                source.topic is MEASUREMENT and self.gatherer.has_truth
-            )
-            most = 1 if newest_only else _KEPT
-            messages, payloads = source.newest.take(most)
-            tick, answered = -1, list[int]()
-            for payload in payloads:
-                try:
-                    message = decode(payload, source.topic.type)
-                except MessageError:
-                    continue  # the recorder keeps it
-                tick = max(tick, message.tick)
-                if isinstance(message, Event):
-                    text = " ".join((message.kind, message.robot, message.detail))
-                    self.happenings = [*self.happenings[1 - _EVENTS :], (message.tick, text)]
-                else:
-                    self.gatherer.take(message, source.robot)
-                if isinstance(message, Status):
-                    answered.append(len(message.tick_us))
-            self.traffic.note(source.name, messages, tick, now)
-            if source.topic is STATUS:
-                # An agent answers each state that it takes in with one command.
-                for topic in (STATE, COMMAND):
-                    self.traffic.note_told(f"{source.robot}/{topic.name}", answered, now)
-            any_came |= messages > 0
-        return any_came
+        arrived = self._take()
+        for _, key, payload in arrived:
+            known = self._topics.get(key)
+            if known is None:
+                self._take_ticks(key, payload, now)
+                continue
+            topic, robot = known
+            try:
+                message = decode(payload, topic.type)
+            except MessageError:
+                continue  # the recorder keeps it
+            self.traffic.note(_short(key), 1, message.tick, now)
+            if isinstance(message, Event):
+                text = " ".join((message.kind, message.robot, message.detail))
+                self.happenings = [*self.happenings[1 - _EVENTS :], (message.tick, text)]
+            else:
+                self.gatherer.take(message, robot)
+        return bool(arrived)
+
+    def _take_ticks(self, key: str, payload: bytes, now: float) -> None:
+        team = key.partition("/")[0]
+        for item in gathered(payload):
+            self.traffic.note(_short(item.key(team)), 1, item.message.tick, now)
+            self.gatherer.take(item.message, item.robot)
+
+
+def _short(key: str) -> str:
+    """A key without the team."""
+    return key.partition("/")[2]
 
 
 def view_live(

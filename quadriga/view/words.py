@@ -17,10 +17,6 @@ from quadriga.view.traffic import KeyTraffic
 
 _CALM: Final = ("walk", "stand")
 _QUIET_S: Final = 1.0  # a key that was silent for longer is shown pale
-_TOLD_NOTE: Final = (
-    "* not listened to: the robot's status tells how many states it has answered, each with one "
-    "command; silent is since its last status"
-)
 _TABLE: Final = "width:100%;border-collapse:collapse;font-size:0.78em;line-height:1.5"
 _CELL: Final = "padding:0 0.5em 0 0;text-align:left;vertical-align:top"
 _NUMBER: Final = "padding:0 0 0 0.5em;text-align:right;font-variant-numeric:tabular-nums"
@@ -79,8 +75,7 @@ def _cells_of(account: RobotAccount, *, known: bool) -> tuple[str, str, str, str
 
 
 def format_traffic(rows: Iterable[KeyTraffic]) -> str:
-    """A row for each key that is listened to, or of which somebody tells."""
-    rows = tuple(rows)
+    """A row for each key."""
     heads = ("key", "per s", "behind", "silent")
     cells = []
     for row in rows:
@@ -88,12 +83,8 @@ def format_traffic(rows: Iterable[KeyTraffic]) -> str:
         silent = _NONE if row.silent_s is None else f"{row.silent_s:.1f} s"
         pale = row.silent_s is None or row.silent_s > _QUIET_S
         key = f"<span style='opacity:{0.5 if pale else 1}'>{escape(row.key)}</span>"
-        if row.told:
-            key += "&thinsp;*"
         cells.append((key, f"{row.per_s:.0f}", behind, silent))
-    table = _table(heads, cells, numbers=(1, 2, 3))
-    note = f"<br>{_TOLD_NOTE}" if any(row.told for row in rows) else ""
-    return _block(f"{table}{note}")
+    return _block(_table(heads, cells, numbers=(1, 2, 3)))
 
 
 def format_happenings(happenings: Sequence[tuple[int, str]]) -> str:

@@ -1,12 +1,11 @@
-"""What other threads put in and one thread takes out: a bounded queue, and the newest of a key."""
+"""What other threads put in and one thread takes out: a bounded queue."""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
 from contextlib import suppress
 from threading import Lock
-from typing import Any, Generic, TypeVar
+from typing import Generic, TypeVar
 
 from quadriga.shared.runtime.clock import monotonic
 
@@ -54,28 +53,11 @@ class Mailbox(Generic[Item]):
                 return self._items.popleft()
         return None
 
+    @property
+    def has_items(self) -> bool:
+        """Whether an item is there."""
+        return bool(self._items)
+
     def drain(self) -> list[Item]:
         """All items that are there, oldest first, without waiting."""
         return [self._items.popleft() for _ in range(len(self._items))]
-
-
-class Newest:
-    """The newest messages of a key, for whoever polls now and then and waits for none of them.
-
-    Args:
-        receive: gives the oldest message that is kept and forgets it; None: there is none.
-    """
-
-    def __init__(self, receive: Callable[[], Any]) -> None:
-        self._receive = receive
-
-    def take(self, wanted: int) -> tuple[int, list[bytes]]:
-        """How many came since this was called last, and at most `wanted` of them, the newest last.
-
-        Fewer than were sent, where more came than are kept.
-        """
-        count, newest = 0, deque[Any](maxlen=wanted)
-        while (sample := self._receive()) is not None:
-            count += 1
-            newest.append(sample)
-        return count, [sample.payload.to_bytes() for sample in newest]

@@ -10,7 +10,6 @@ from collections import Counter
 from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from queue import SimpleQueue
-from threading import get_ident
 from types import MappingProxyType
 from typing import Any, Final, Self
 
@@ -18,7 +17,7 @@ import zenoh
 
 from quadriga.shared.about import HERE as HERE
 from quadriga.shared.about import READY as READY
-from quadriga.shared.bus.ring_buffer import Mailbox, Newest
+from quadriga.shared.bus.ring_buffer import Mailbox
 from quadriga.shared.bus.settings import (
     NO_LINK,
     check_trust,
@@ -44,7 +43,6 @@ _LINK_TIMEOUT: Final = 5.0  # s
 # can do. Zenoh reads this when a process opens its first session.
 _THREADS: Final = "ZENOH_RUNTIME"
 _ONE_RECEIVES: Final = "(rx: (worker_threads: 1), acc: (handover: rx), net: (handover: rx))"
-_attached: Final[set[int]] = set()  # the threads of Zenoh that keep their Python state
 
 
 def pause() -> None:
@@ -176,32 +174,35 @@ class Bus:
         while not (self.linked or stopped()) and monotonic() < deadline:
             pause()
 
-    def publisher(
-        self, key: str, *, droppable: bool = False, urgent: bool = False
-    ) -> Callable[[bytes], None]:
-        """A function that sends a payload on `key`.
-
-        What is neither waits for whoever is slow, and a router keeps everybody waiting with it.
+    def publisher(self, key: str, *, waits: bool = True) -> Callable[[bytes], None]:
+        """A function that sends a payload on `key` at once.
 
         Args:
             key: the full key, `<team>/…`.
-            droppable: drop when a receiver is slow (real time) instead of waiting for it.
-            urgent: overtake all else and never wait; dropped only where nothing goes through.
+            waits: wait for whoever is slow, and keep everybody waiting with a router; else who is
+                slow misses some.
         """
-        control = zenoh.CongestionControl
-        publisher = self._session.declare_publisher(
-            key,
-            express=urgent or not droppable,  # see `_COMMON` of the settings
-            congestion_control=control.DROP if droppable or urgent else control.BLOCK,
-            priority=zenoh.Priority.REAL_TIME if urgent else zenoh.Priority.DATA,
-        )
-        self._declarations.append(publisher)
-        put: Callable[[bytes], None] = publisher.put
-        return put
+        return self._publisher(key, waits, zenoh.Priority.DATA)
+
+    def urgent_publisher(self, key: str) -> Callable[[bytes], None]:
+        """Likewise, for what people say and what happens: it waits for nobody, overtakes all else.
+
+        So it gets through a router whose other queues are full since somebody is frozen.
+        """
+        return self._publisher(key, False, zenoh.Priority.REAL_TIME)
 
     def subscribe(self, key: str) -> None:
         """Feed what others publish on `key` (may hold `*` and `**`) into the inbox."""
-        self._hear(key, _direct(self._inbox.put))
+        self._hear(key, self._inbox.put)
+
+    def hear(self, key: str, call: Callable[[bytes], None]) -> None:
+        """Have `call` take what others publish on `key`: in the receiving thread, quick."""
+        self._hear(key, lambda sample: call(sample.payload.to_bytes()))
+
+    @property
+    def has_mail(self) -> bool:
+        """Whether there is anything in the inbox."""
+        return self._inbox.has_items
 
     @property
     def dropped(self) -> int:
@@ -215,21 +216,27 @@ class Bus:
         """
         kept: SimpleQueue[Arrival] = SimpleQueue()
         for key in keys:
-            self._hear(key, _direct(lambda sample: kept.put((monotonic_ns(), *_packet(sample)))))
+            self._hear(key, lambda sample: kept.put((monotonic_ns(), *_packet(sample))))
         return lambda: [kept.get_nowait() for _ in range(kept.qsize())]
 
-    def keep_newest(self, key: str, most: int) -> Newest:
-        """Keep the newest `most` of what others publish on `key`, apart from the inbox.
+    def keep_newest(self, key: str) -> Callable[[], bytes | None]:
+        """Keep the newest of what others publish on `key`, apart from the inbox.
 
-        Zenoh does that by itself: nobody waits for this process, however rarely it looks.
+        The function returned gives it once, None if nothing has come since. Zenoh keeps it, so that
+        what nobody looks at costs this process nothing.
         """
-        return Newest(self._hear(key, zenoh.handlers.RingChannel(most)).try_recv)
+        kept = self._declare_subscriber(key, zenoh.handlers.RingChannel(1))
+
+        def take() -> bytes | None:
+            sample = kept.try_recv()
+            return None if sample is None else sample.payload.to_bytes()
+
+        return take
 
     def answer(self, key: str, call: Callable[[], bytes]) -> None:
         """Answer who asks on `key` with `call()`: in the receiving thread, quick, never raising."""
-        self._declarations.append(
-            self._session.declare_queryable(key, _direct(lambda query: query.reply(key, call())))
-        )
+        answering = _direct(lambda query: query.reply(key, call()))
+        self._declarations.append(self._session.declare_queryable(key, answering))
 
     def ask(self, key: str, timeout: float) -> Answers:
         """Ask all who answer on `key` (may hold `*`) and do not wait for them.
@@ -330,7 +337,21 @@ class Bus:
         )
         return all(reply.ok is not None for reply in asked)
 
-    def _hear(self, key: str, handler: Any) -> Any:
+    def _publisher(
+        self, key: str, waits: bool, priority: zenoh.Priority
+    ) -> Callable[[bytes], None]:
+        control = zenoh.CongestionControl.BLOCK if waits else zenoh.CongestionControl.DROP
+        publisher = self._session.declare_publisher(
+            key, express=True, congestion_control=control, priority=priority
+        )
+        self._declarations.append(publisher)
+        put: Callable[[bytes], None] = publisher.put
+        return put
+
+    def _hear(self, key: str, call: Callable[[zenoh.Sample], object]) -> None:
+        self._declare_subscriber(key, _direct(call))
+
+    def _declare_subscriber(self, key: str, handler: Any) -> Any:
         heard = self._session.declare_subscriber(key, handler, allowed_origin=zenoh.Locality.REMOTE)
         self._declarations.append(heard)
         return heard
@@ -348,23 +369,9 @@ def _packet(sample: zenoh.Sample) -> Packet:
     return str(sample.key_expr), sample.payload.to_bytes()
 
 
-def _direct(call: Callable[[Any], None]) -> Any:
-    """A Zenoh callback in the receiving thread, which then keeps its Python state.
-
-    Python gives a foreign thread a state when it enters and takes it away when it leaves, for each
-    message; one that was entered once more than it is left stays, as long as the thread. Measured
-    at 2,000 messages a second: 33 µs of a processor for each, 44 µs without it (mean of five
-    interleaved pairs). A later thread of the same number gets a state for each message.
-    """
-
-    def enter(item: Any) -> None:
-        thread = get_ident()
-        if thread not in _attached:
-            _attached.add(thread)
-            ctypes.pythonapi.PyGILState_Ensure()
-        call(item)
-
-    return zenoh.handlers.Callback(enter, indirect=False)
+def _direct(call: Callable[[Any], object]) -> Any:
+    """A Zenoh callback in the receiving thread, without a thread of its own in between."""
+    return zenoh.handlers.Callback(call, indirect=False)
 
 
 def _open(settings: dict[str, Any], name: str) -> zenoh.Session:

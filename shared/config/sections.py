@@ -99,6 +99,17 @@ class BusConfig:
 
 
 @dataclass(frozen=True, slots=True)
+class PlantConfig:
+    """How a plant and the agents of its robots reach each other."""
+
+    link: str = choice(
+        ("auto", "local", "bus"),
+        "states and commands; local: sockets of one computer and user; bus: keys of the bus; auto: "
+        "local where both ends are on one computer, which they are on the loopback",
+    )
+
+
+@dataclass(frozen=True, slots=True)
 class WorldConfig:
     """The simulated world and its seeded disturbances."""
 
@@ -520,6 +531,7 @@ class Config:
 
     team: TeamConfig = field(default_factory=TeamConfig)
     bus: BusConfig = field(default_factory=BusConfig)
+    plant: PlantConfig = field(default_factory=PlantConfig)
     world: WorldConfig = field(default_factory=WorldConfig)
     sensors: SensorsConfig = field(default_factory=SensorsConfig)
     motors: MotorsConfig = field(default_factory=MotorsConfig)

@@ -31,7 +31,7 @@ class TickTrack:
         gaps: where, at most the first thousand.
     """
 
-    __slots__ = ("_period", "count", "first", "gaps", "last", "lost")
+    __slots__ = ("_missing", "_period", "_skipped", "count", "first", "gaps", "last")
 
     def __init__(self, period: int, before: int = -1) -> None:
         """Begin to follow.
@@ -42,7 +42,7 @@ class TickTrack:
         """
         self._period, self.last = period, before
         self.first = -1
-        self.count = self.lost = 0
+        self.count = self._missing = self._skipped = 0
         self.gaps: list[Gap] = []
 
     def note(self, tick: int) -> None:
@@ -57,14 +57,22 @@ class TickTrack:
             if not 0 < step < _JUMP:
                 return
             missing = (step - 1) // self._period
-            self.lost += missing
+            self._missing += missing
             if missing and len(self.gaps) < _KEPT:
                 self.gaps.append((self.last, tick))
         self.last = tick
 
     def skip(self, count: int) -> None:
-        """Of the missing messages `count` were never sent, so they are not lost."""
-        self.lost = max(0, self.lost - count)
+        """Of the missing messages `count` were never sent, so they are not lost.
+
+        That may be known before they are missed.
+        """
+        self._skipped += count
+
+    @property
+    def lost(self) -> int:
+        """See the class."""
+        return max(0, self._missing - self._skipped)
 
 
 def lost_by_key(tracks: Mapping[str, TickTrack]) -> dict[str, int]:

@@ -9,14 +9,16 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from mcap.writer import CompressionType, Writer
+from mcap.writer import CompressionType
 
-from quadriga.shared.codec import envelope
+from quadriga.shared.codec import encode, envelope
 from quadriga.shared.errors import RecordingError, name_file_errors
+from quadriga.shared.messages import Message
+from quadriga.shared.recording.block_writer import BlockWriter, RecordedMessage
 from quadriga.shared.recording.metadata import CHANNELS, COUNTS, LOST, PROFILE, seal
 from quadriga.shared.recording.quota import OVERSIZED, REFUSED, Quota
 from quadriga.shared.recording.ticks import TickTrack, lost_by_key
@@ -73,7 +75,7 @@ class RecordingWriter:
         with name_file_errors(RecordingError, path, "a writable folder"):
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file = path.open("xb")
-        self._mcap = Writer(
+        self._mcap = BlockWriter(
             self._file, chunk_kib * 1024, CompressionType.LZ4, enable_data_crcs=True
         )
         self._mcap.start(PROFILE, "quadriga")
@@ -108,21 +110,35 @@ class RecordingWriter:
 
     def write(self, key: str, payload: bytes, log_time_ns: int) -> None:
         """Append one message as sent; `log_time_ns` is its reception, see `clock.log_ns`."""
-        row = self._channels.get(key)
         if len(payload) > self.quota.largest:
             self.quota.refused[OVERSIZED] += 1
             return
-        if row is None:
-            if not self.quota.admits(key, len(self._channels)):
-                self.quota.refused[REFUSED] += 1
-                return
-            row = self._channels[key] = self._channel(key)
-        channel, track = row
         tick, publish_time = envelope(payload) or (-1, log_time_ns)
-        self._mcap.add_message(channel, log_time_ns, payload, publish_time, track.count)
-        self._open += MESSAGE_SIZE + len(payload)
-        track.note(tick)
-        self.messages += 1
+        self._write([(key, tick, publish_time, log_time_ns, payload)])
+
+    def write_all(self, messages: Iterable[tuple[str, Message, int]]) -> None:
+        """Append messages that are encoded here, each with its key and its log time."""
+        self._write(
+            [(key, m.tick, m.stamp_ns, log_time, encode(m)) for key, m, log_time in messages]
+        )
+
+    def _write(self, messages: Iterable[tuple[str, int, int, int, bytes]]) -> None:
+        """Append messages: key, tick, publish time, log time, payload."""
+        added = list[RecordedMessage]()
+        for key, tick, publish_time, log_time, payload in messages:
+            row = self._channels.get(key)
+            if row is None:
+                if not self.quota.admits(key, len(self._channels)):
+                    self.quota.refused[REFUSED] += 1
+                    continue
+                row = self._channels[key] = self._channel(key)
+            channel, track = row
+            added.append(RecordedMessage(channel, log_time, publish_time, track.count, payload))
+            self._open += MESSAGE_SIZE + len(payload)
+            track.note(tick)
+        if added:
+            self._mcap.add_messages(added)
+        self.messages += len(added)
 
     def note(self, name: str, values: Mapping[str, str]) -> None:
         """Write down something about the recording, see `Recording.notes`."""

@@ -81,7 +81,12 @@ class Rate:
         slack: float = 20.0,
     ) -> None:
         self._period, self._now, self._pause, self._slack = period, now, pause, slack
-        self._next, self.overruns, self.lost = now(), 0, 0.0
+        self._next = self._begun = now()
+        self.overruns, self.lost = 0, 0.0
+
+    def wait_within(self, share: float) -> None:
+        """Wait until a share of a period has passed since the present turn began."""
+        self._pause(self._begun + share * self._period - self._now())
 
     def wait(self) -> float:
         """Wait for the next turn and return how late it begins, in seconds."""
@@ -89,12 +94,12 @@ class Rate:
         ahead = self._next - self._now()
         if ahead > 0.0:
             self._pause(ahead)
-        late = max(self._now() - self._next, 0.0)
+        self._begun = self._now()
+        late = max(self._begun - self._next, 0.0)
         self.overruns += late > self._period
         if late > self._slack * self._period:
-            now = self._now()
-            self.lost += now - self._next
-            self._next = now
+            self.lost += late
+            self._next = self._begun
         return late
 
 

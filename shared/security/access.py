@@ -19,9 +19,21 @@ from quadriga.shared import members
 from quadriga.shared.about import about_key
 from quadriga.shared.codec import MAX_BYTES
 from quadriga.shared.config.sections import Config
+from quadriga.shared.link.connections import link_key
 from quadriga.shared.members import AGENT, DOCTOR, LEADS, OBSERVER, RECORDER, ROUTER, Member, Role
 from quadriga.shared.robots.conventions import robot_names
-from quadriga.shared.topics import CLOCK, ESTOP, RECEIVED, STATE, STATUS, TABLE, TRUTH, Topic
+from quadriga.shared.topics import (
+    CLOCK,
+    COMMAND,
+    ESTOP,
+    RECEIVED,
+    STATE,
+    STATUS,
+    TABLE,
+    TICKS,
+    TRUTH,
+    Topic,
+)
 
 _SPEAKERS: Final = (members.ESTOP, members.STOP, members.RESET, members.RESUME)
 _OTHERS: Final = (members.LAUNCHER, *_SPEAKERS, DOCTOR, OBSERVER, ROUTER)
@@ -72,10 +84,15 @@ def team_rights(config: Config) -> dict[str, Rights]:
             sent = [topic for topic in TABLE if topic is ESTOP or role in topic.senders]
             heard = [topic for topic in TABLE if role in topic.receivers]
             found[who.name] = Rights(
-                [t.key(team, name) for t in sent for name in _names(who, t, robots)],
-                [t.key(team, who.robot if t is STATE and role == AGENT else "*") for t in heard],
+                [_key(t, team, name) for t in sent for name in _names(who, t, robots)],
+                [_key(t, team, who.robot if t is STATE and role == AGENT else "*") for t in heard],
             )
     return found
+
+
+def _key(topic: Topic, team: str, robot: str) -> str:
+    """The key of a topic; states and commands have those of the plant link."""
+    return link_key(team, robot, topic) if topic in (STATE, COMMAND) else topic.key(team, robot)
 
 
 def _names(who: Member, topic: Topic, robots: Sequence[str]) -> Sequence[str]:
@@ -84,7 +101,7 @@ def _names(who: Member, topic: Topic, robots: Sequence[str]) -> Sequence[str]:
         return ()
     if not topic.per_robot:
         return ("",)
-    if topic is STATUS:
+    if topic in (STATUS, TICKS):
         return (who.name,)
     return (who.robot,) if who.robot else robots
 
@@ -108,7 +125,7 @@ def access_control(config: Config) -> dict[str, Any]:
         _rule("tokens-seen", ["liveliness_token"], _OUT, tokens),
         _rule("tokens-asked", ["liveliness_query", "declare_liveliness_subscriber"], _BOTH, tokens),
         # A publisher sends nothing before it knows that somebody listens.
-        _rule("listeners-seen", ["declare_subscriber"], _OUT, [f"{team}/**"]),
+        _rule("listeners-seen", ["declare_subscriber"], _OUT, [f"{team}/**", f"{team}/@link/**"]),
         _rule("questions", ["declare_queryable", "query", "reply"], _BOTH, questions),
     ]
     rules, subjects, policies = [*common], list[dict[str, Any]](), list[dict[str, Any]]()

@@ -23,7 +23,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -44,17 +44,6 @@ _TAU, _Q_DES, _V_DES, _KP, _KD = (
 )
 
 
-class MotorData(NamedTuple):
-    """What motors and joints are like; arrays are by joint, (12,)."""
-
-    curves: MotorCurves  # torque limits of a cool motor
-    continuous: Array  # torque limit of a hot one, N·m
-    follow: float  # share of a torque error that is made up for in a tick
-    friction: float  # dry friction, N·m
-    viscous: float  # friction by rate, N·m·s/rad
-    heating: float  # share of a tick in the filter of the temperature; 0: it stays
-
-
 class Motors:
     """The motors of all robots of a world.
 
@@ -69,14 +58,12 @@ class Motors:
         self._memory = np.zeros((4, robots, N_JOINTS))
         self.torque, self.joint_torque, self.heat, _ = self._memory
         lag = 1.0 - math.exp(-2.0 * math.pi * config.bandwidth * _TICK)
-        self._data = MotorData(
-            curves=motor_curves(robot, torque_speed=config.torque_speed),
-            continuous=np.tile(robot.continuous_torque, N_LEGS),
-            follow=lag if config.bandwidth > 0.0 else 1.0,
-            friction=config.friction,
-            viscous=config.viscous_friction,
-            heating=_TICK / config.heat_time if config.heat_time > 0.0 else 0.0,
-        )
+        # Of each joint the limits of a cool motor, `MotorCurves`, and that of a hot one, N·m.
+        hot = np.tile(robot.continuous_torque, N_LEGS)
+        self._limits = np.array([*motor_curves(robot, torque_speed=config.torque_speed), hot])
+        self._follow = lag if config.bandwidth > 0.0 else 1.0
+        self._friction = config.friction, config.viscous_friction
+        self._heating = _TICK / config.heat_time if config.heat_time > 0.0 else 0.0
         on_the_way = [np.tile(idle.row, (robots, 1)) for _ in range(config.delay_ms)]
         self._on_the_way: deque[Array] = deque(on_the_way)
 
@@ -94,14 +81,30 @@ class Motors:
             v: velocities, its joints behind the trunk's six, (n, 18).
             strength: the share of its limited torque that each motor gives, (n, 12).
         """
-        _drive(arrived, q, v, strength, self._data, self._memory)
+        limits, friction, memory = self._limits, self._friction, self._memory
+        _drive(arrived, q, v, strength, limits, self._follow, friction, self._heating, memory)
 
 
 @compiled
 def _drive(
-    commands: Array, q: Array, v: Array, strength: Array, data: MotorData, memory: Array
+    commands: Array,
+    q: Array,
+    v: Array,
+    strength: Array,
+    limits: Array,
+    follow: float,
+    friction: tuple[float, float],
+    heating: float,
+    memory: Array,
 ) -> None:
-    """Advance torques, what of them is left for the joints, heat and what sound motors give."""
+    """Advance torques, what of them is left for the joints, heat and what sound motors give.
+
+    `limits` are those of `MotorCurves` and of a hot motor, (5, 12); `follow` is the share of a
+    torque error that is made up for in a tick; `friction` is dry, N·m, and by rate, N·m·s/rad;
+    `heating` is the share of a tick in the filter of the temperature, 0: it stays.
+    """
+    curves, hot = MotorCurves(limits[0], limits[1], limits[2], limits[3]), limits[4]
+    dry, viscous = friction
     torque, left, heat, sound = memory[0], memory[1], memory[2], memory[3]
     for i in range(len(commands)):
         row, angles, rates = commands[i], q[i, JOINT_POSITIONS], v[i, JOINT_RATES]
@@ -111,20 +114,20 @@ def _drive(
             wanted = kp[k] * (q_des[k] - angles[k])
             wanted += kd[k] * (v_des[k] - rates[k])
             wanted += tau_ff[k]
-            lower, upper = torque_range(rates[k], data.curves, k)
-            if data.heating > 0.0:
+            lower, upper = torque_range(rates[k], curves, k)
+            if heating > 0.0:
                 # Heat limits the current, speed the voltage: the lower limit holds.
-                peak, continuous = data.curves.peak[k], data.continuous[k]
+                peak, continuous = curves.peak[k], hot[k]
                 cool = min(1.0, max(0.0, (1.0 - heat[i, k]) / (1.0 - _WARM)))
                 limit = continuous + cool * (peak - continuous)
                 lower, upper = max(lower, -limit), min(upper, limit)
             wanted = min(max(wanted, lower), upper)
-            if data.follow < 1.0:
-                wanted = sound[i, k] + data.follow * (wanted - sound[i, k])
+            if follow < 1.0:
+                wanted = sound[i, k] + follow * (wanted - sound[i, k])
             sound[i, k] = min(max(wanted, lower), upper)
             torque[i, k] = strength[i, k] * sound[i, k]
-            loss = (torque[i, k] / data.continuous[k]) ** 2
-            heat[i, k] += data.heating * (loss - heat[i, k])
+            loss = (torque[i, k] / hot[k]) ** 2
+            heat[i, k] += heating * (loss - heat[i, k])
             left[i, k] = torque[i, k]
-            if data.friction > 0.0 or data.viscous > 0.0:
-                left[i, k] -= data.friction * math.tanh(rates[k] / _CREEP) + data.viscous * rates[k]
+            if dry > 0.0 or viscous > 0.0:
+                left[i, k] -= dry * math.tanh(rates[k] / _CREEP) + viscous * rates[k]

@@ -160,9 +160,9 @@ class Sensors:
             self._draw()
         rows, now = np.empty((len(q), _ROW)), self._next
         yaw = self._yaw_rate * (1e-3 * tick)
-        _observe(q, v, tau, sensed, self._noise[now], self._turns[now], yaw, rows)
+        _observe(q, v, tau, sensed, self._noise, self._turns, now, yaw, rows)
         _convert_foot_forces(
-            self._kind, self._feet.scale, self._unloaded[now], self._faults[now], self._last, rows
+            self._kind, self._feet.scale, self._unloaded, self._faults, now, self._last, rows
         )
         self._next += 1
         return rows
@@ -190,12 +190,13 @@ def _observe(
     sensed: Array,
     noise: Array,
     turns: Array,
+    now: int,
     yaw: Array,
     rows: Array,
 ) -> None:
     """Fill the rows of all robots' states; `yaw`, (n,), is the drift of their headings, rad."""
     for i in range(len(rows)):
-        row, extra = rows[i], noise[i]
+        row, extra = rows[i], noise[now, i]
         row[_Q] = extra[_Q] + q[i, JOINT_POSITIONS]
         row[_V] = extra[_V] + v[i, JOINT_RATES]
         row[_TAU] = extra[_TAU] + tau[i]
@@ -203,7 +204,7 @@ def _observe(
         row[_STATE_ACCEL] = extra[_ACCEL] + sensed[i, SPECIFIC_FORCE]
         row[_STATE_FOOT] = extra[_FOOT] + sensed[i, FOOT_FORCES]
         # The measured attitude is the drift about the world's z ⊗ the true one ⊗ the turn.
-        attitude, turn = q[i, ATTITUDE], turns[i]
+        attitude, turn = q[i, ATTITUDE], turns[now, i]
         a, b, c, d = attitude[0], attitude[1], attitude[2], attitude[3]
         p, r, s, t = turn[0], turn[1], turn[2], turn[3]
         w, x = p * a - r * b - s * c - t * d, r * a + p * b + t * c - s * d
@@ -216,12 +217,12 @@ def _observe(
 
 @compiled
 def _convert_foot_forces(
-    kind: int, scale: Array, unloaded: Array, faults: Faults, last: Array, rows: Array
+    kind: int, scale: Array, unloaded: Array, faults: Faults, now: int, last: Array, rows: Array
 ) -> None:
     """Make of the noisy normal forces in the states' rows what the sensors say of them.
 
     They have `scale` counts per N and some counts `unloaded`; `last`, what each read last, changes
-    in place. All are of shape (n, 4).
+    in place. All are of shape (n, 4), of the block of draws those `now`.
     """
     for i in range(len(rows)):
         feet = rows[i, _STATE_FOOT]
@@ -231,8 +232,8 @@ def _convert_foot_forces(
             elif kind == _NEWTONS:
                 feet[foot] = max(0.0, feet[foot])  # such a sensor cannot pull
             else:
-                fault = faults[i, foot]
+                fault = faults[now, i, foot]
                 if fault == MEASURES:
-                    counts = np.rint(scale[i, foot] * feet[foot] + unloaded[i, foot])
+                    counts = np.rint(scale[i, foot] * feet[foot] + unloaded[now, i, foot])
                     last[i, foot] = min(_MOST, max(_LEAST, counts))
                 feet[foot] = 0.0 if fault == READS_ZERO else last[i, foot]

@@ -18,6 +18,7 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError
 from quadriga.shared.messages import Command, Event, State, Truth
 from quadriga.shared.robots.conventions import FOOT_FRAMES, N_JOINTS, N_LEGS, Array
+from quadriga.shared.runtime.jit import compiled
 from quadriga.sim_server.terrain.terrain import FOLLOW_MS
 from quadriga.sim_server.world import layout
 from quadriga.sim_server.world.faults import Injection, with_time
@@ -40,6 +41,8 @@ def _warn(text: str) -> None:
 
 # By default MuJoCo leaves a file in the working directory.
 mujoco.set_mju_user_warning(_warn)
+
+_UP, _DOWN, _NO_NUMBERS = range(3)  # how trunks are, see `_look`
 
 
 class World(Plant):
@@ -99,6 +102,7 @@ class World(Plant):
         Motors(config.robot, config.motors, n, _DAMPED).drive(
             np.zeros((n, len(_DAMPED.row))), self._q, self._v, self._strength
         )
+        _look(self._q, _FALL_COSINE, self._surely_up)
         self._sensors = Sensors(config.sensors, config.world.seed, self._indices)
 
         self.physics.qpos[:] = self.team.q_spawn
@@ -216,11 +220,14 @@ class World(Plant):
     def _falls(self) -> list[Event]:
         """An event for each robot that fell in this tick; of an unstable simulation one for all."""
         events = list[Event]()
-        if any(self._unstable.tolist()) or not math.isfinite(float(np.add.reduce(self._q, None))):
+        how = _look(self._q, _FALL_COSINE, self._surely_up)
+        if any(self._unstable.tolist()) or how == _NO_NUMBERS:
             if self._down != self.names:
                 self._down = self.names
                 detail = "unstable simulation: positions, speeds or accelerations are no numbers"
                 events.append(Event.of(self.tick, UNSTABLE, "", f"{detail}, or huge"))
+            return events
+        if how == _UP and not self._excused:
             return events
         for i, (x, y, z, qw, qx, qy, qz) in enumerate(self._q[:, layout.POSE].tolist()):
             cosine = 1.0 - 2.0 * (qx * qx + qy * qy)
@@ -255,3 +262,16 @@ class World(Plant):
         if name not in self._stopped:
             self._excused.discard(name)
             self._lying.discard(name)
+
+
+@compiled
+def _look(q: Array, cosine: float, height: float) -> int:
+    """`_UP`: all trunks are level and high enough, by their coordinates q, (n, 19)."""
+    found = _UP
+    for i in range(len(q)):
+        if not np.isfinite(np.sum(q[i])):
+            return _NO_NUMBERS
+        level = 1.0 - 2.0 * (q[i, 4] * q[i, 4] + q[i, 5] * q[i, 5])
+        if not (level >= cosine and q[i, 2] >= height):
+            found = _DOWN
+    return found

@@ -85,7 +85,7 @@ def test_everyone_reaches_everyone_though_all_know_only_the_sim_server(opened: O
     begun = monotonic()
     assert r1.get(0.05) is None  # nobody hears himself
     assert 0.04 < monotonic() - begun < 1.0
-    r2.publisher("team/r2/x", droppable=True)(b"\x00\xff")
+    r2.publisher("team/r2/x", waits=False)(b"\x00\xff")
     assert sim.get(WAIT) == ("team/r2/x", b"\x00\xff")
     assert sim.drain() == []
 

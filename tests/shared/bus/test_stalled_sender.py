@@ -26,7 +26,7 @@ COUNT = 400  # 0.2 s of the states of two robots
 def starved(config: Config, told: Event, sent: Event, heard: Event) -> None:
     """Send while the threads that carry it out hardly ever get a processor."""
     with Bus.open(config.bus, "team", SIM) as bus:
-        put = bus.publisher(KEY, droppable=True)
+        put = bus.publisher(KEY, waits=False)
         bus.declare(HERE)
         assert told.wait(WAIT)
         schedule_others(os.SCHED_IDLE)

@@ -66,7 +66,7 @@ def congested() -> Iterator[tuple[Bus, Bus]]:
         for bus in (sim, operator):
             assert bus.wait_for(HERE, {"recorder", "r1"}, WAIT, lambda: False)
         recorder.send_signal(signal.SIGSTOP)
-        put = sim.publisher("team/sim/x", droppable=True)
+        put = sim.publisher("team/sim/x", waits=False)
         for _ in range(CHUNKS):
             put(CHUNK)
             sleep(PACE)
@@ -86,7 +86,7 @@ def longest_way(operator: Bus, r1: Bus, *, droppable: bool = False, urgent: bool
 
 
 def test_what_waits_for_nobody_arrives_though_a_link_is_full(congested: tuple[Bus, Bus]) -> None:
-    assert longest_way(*congested, urgent=True) < SOON
-    assert longest_way(*congested, droppable=True) < SOON
+    assert longest_way(*congested, waits=False) < SOON
+    assert longest_way(*congested, waits=False) < SOON
     # What waits for everybody is held up: the link is full indeed.
     assert longest_way(*congested) > SOON
