@@ -1,6 +1,6 @@
 """The command line of a program of one's own that is the agent of each robot.
 
-Any program that speaks `state` and `command` may be one, see docs/tutorials/own_controller.md.
+Any program that speaks the plant link may be one, see docs/tutorials/own_controller.md.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from quadriga.shared.errors import ConfigError, name_file_errors
 KEY: Final = "team.agent_command"
 # What stands in braces in the command line, and is filled in for each robot; the program finds the
 # same in its environment, under this prefix and in capitals.
-PLACES: Final = ("robot", "team", "config", "endpoint", "mode", "listen")
+PLACES: Final = ("robot", "team", "config", "endpoint", "mode", "listen", "plant", "link")
 ENVIRONMENT: Final = "QUADRIGA_"
 _PLACE: Final = re.compile(r"\{(\w+)\}")
 

@@ -12,6 +12,8 @@ from typing import Final, NoReturn
 from quadriga.shared.agent_command import KEY, environment_of, fill_in, parse_line
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import ConfigError, system_reason
+from quadriga.shared.link.connections import local_address
+from quadriga.shared.members import plant_name
 
 _PYTHON: Final = "python"  # the interpreter that this project runs in
 _SCRIPT: Final = ".py"
@@ -41,7 +43,8 @@ def places_of(config: Config, robot: str, file: Path) -> dict[str, str]:
         robot: the robot.
         file: holds the configuration.
     """
-    bus = config.bus
+    bus, plant = config.bus, plant_name(robot if config.team.plant_per_robot else "")
+    link = None if config.plant.link == "bus" else local_address(config, plant)
     return {
         "robot": robot,
         "team": config.team.name,
@@ -49,6 +52,8 @@ def places_of(config: Config, robot: str, file: Path) -> dict[str, str]:
         "endpoint": bus.endpoint,
         "mode": bus.mode,
         "listen": bus.listen,
+        "plant": plant,
+        "link": "" if link is None else str(link),
     }
 
 

@@ -10,73 +10,62 @@ from __future__ import annotations
 
 import argparse
 import os
+from contextlib import closing
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
 from quadriga.shared.bus.discovery import join
-from quadriga.shared.bus.session import HERE, POLL, READY, Bus
-from quadriga.shared.codec import decode, encode
+from quadriga.shared.bus.session import READY, Bus
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
-from quadriga.shared.errors import MessageError
-from quadriga.shared.members import has_lead
-from quadriga.shared.messages import Command, Event, State
+from quadriga.shared.link.agent_end import AgentEnd
+from quadriga.shared.messages import Command
 from quadriga.shared.robots.conventions import N_JOINTS
 from quadriga.shared.runtime.clock import sleep
 from quadriga.shared.runtime.scheduling import take_priority
 from quadriga.shared.runtime.signals import die_with_parent, stop_on_signals
-from quadriga.shared.topics import COMMAND, EVENT, STATE
 
 WELL: Final = 100  # ms
 SLOW: Final = 2e-3  # s, for an answer
 AHEAD: Final = 1000  # ms
 
 
-def answer(config: Config, tick: int, way: str) -> bytes | None:
+def answer(config: Config, tick: int, way: str) -> Command | None:
     """The command that answers the state of a tick; None: there is none."""
     zero, kp, kd = np.zeros(N_JOINTS), np.full(N_JOINTS, 80.0), np.full(N_JOINTS, 3.0)
     command = Command(tick, 10**6 * tick, zero, config.robot.q_stand, zero, kp, kd)
     if way == "slow":
         sleep(SLOW)
     if way in ("", "slow") or tick < WELL:
-        return encode(command)
+        return command
     if way == "silent":
         return None
     if way == "ticks":
-        return encode(Command(tick + AHEAD, 10**6 * tick, zero, config.robot.q_stand, zero, kp, kd))
-    return encode(Command.from_row(tick, 10**6 * tick, np.full(5 * N_JOINTS, np.nan)))
+        return Command.from_row(tick + AHEAD, 10**6 * tick, command.row)
+    return Command.from_row(tick, 10**6 * tick, np.full(5 * N_JOINTS, np.nan))
 
 
 def run(config: Config, robot: str, way: str) -> None:
     """Answer the newest state until the walk is over."""
     stopped = stop_on_signals()
-    team, ended = config.team.name, False
-    with Bus.open(config.bus, team, robot, stopped) as bus:
-        bus.subscribe(STATE.key(team, robot))
-        bus.subscribe(EVENT.key(team))
-        put = bus.publisher(COMMAND.key(team, robot))
-        join(bus, config, stopped)
+    with (
+        Bus.open(config.bus, config.team.name, robot, stopped) as bus,
+        closing(AgentEnd(config, robot, bus)) as link,
+    ):
+        if not (join(bus, config, stopped) and link.open(stopped)):
+            return
         if config.world.mode == "realtime":  # or it lies down on a busy machine
             take_priority(config.runtime.priority)
         bus.declare(READY)
-        while not (stopped() or ended):
-            packet = bus.get(POLL)
-            if packet is None:
-                ended = not has_lead(bus.members_at(HERE))
-                continue
-            newest = None
-            for key, payload in (packet, *bus.drain()):
-                try:
-                    if key == EVENT.key(team):
-                        ended = ended or decode(payload, Event).kind == "stop"
-                    else:
-                        newest = decode(payload, State)
-                except MessageError as error:
-                    print(error, flush=True)
-            if newest is not None and (sent := answer(config, newest.tick, way)) is not None:
-                put(sent)
+        while not (stopped() or link.ended or link.closed):
+            came = link.receive(wait=True)
+            while came and link.receive(wait=False):
+                pass
+            if came and (command := answer(config, link.received.tick, way)) is not None:
+                link.command.row[:] = command.row
+                link.send(link.command.stamp(command.tick, command.stamp_ns))
 
 
 if __name__ == "__main__":
