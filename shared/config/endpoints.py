@@ -32,11 +32,6 @@ def host_and_port(endpoint: str) -> tuple[str, int]:
     return host, int(port)
 
 
-def port_of(endpoint: str) -> str:
-    """What stands behind the host of an endpoint, such as a port; all of it without one."""
-    return endpoint.rpartition(":")[2]
-
-
 def _split(address: str) -> tuple[str, str]:
     host, _, port = address.rpartition(":")
     return host.removeprefix("[").removesuffix("]"), port

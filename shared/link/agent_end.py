@@ -78,7 +78,8 @@ class AgentEnd:
         Raises:
             BusError: it refuses, or does not answer.
         """
-        way, said, deadline = self._connect(), -_AGAIN, monotonic() + _PATIENCE
+        way = self._way = self._connect()
+        said, deadline = -_AGAIN, monotonic() + _PATIENCE
         while not stopped():
             if monotonic() > said + _AGAIN:  # over the bus it may hear this process later
                 said = monotonic()
@@ -90,7 +91,6 @@ class AgentEnd:
                 continue
             fault = self.received.parse(size)
             if not fault and self.received.kind == WELCOME:
-                self._way = way
                 return True
             why = fault or self.received.text(size)
             raise self._error(f"refused: {why}", "another version, user or robot, or started twice")

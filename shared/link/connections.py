@@ -17,7 +17,6 @@ from typing import Final, Protocol
 
 from quadriga.shared.bus.ring_buffer import Mailbox
 from quadriga.shared.bus.session import POLL
-from quadriga.shared.config.endpoints import is_loopback, port_of
 from quadriga.shared.config.sections import Config
 from quadriga.shared.runtime.places import make_runtime_dir
 from quadriga.shared.topics import Topic
@@ -126,9 +125,8 @@ def local_address(config: Config, plant: str) -> Path | None:
         config: the team's configuration.
         plant: name of the process.
     """
-    endpoint, folder = config.bus.endpoint, make_runtime_dir()
-    where = port_of(endpoint) if is_loopback(endpoint) else endpoint
-    name = sha256(f"{where} {config.team.name} {plant}".encode()).hexdigest()[:20]
+    folder, of = make_runtime_dir(), f"{config.bus.endpoint} {config.team.name} {plant}"
+    name = sha256(of.encode()).hexdigest()[:20]
     return None if folder is None else folder / f"{name}.link"
 
 

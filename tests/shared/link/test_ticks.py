@@ -1,0 +1,95 @@
+"""Batches give back what was gathered, to the byte, with its own time."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as nps
+
+from quadriga.shared.codec import decode, encode
+from quadriga.shared.link.packets import COMMAND_SIZE, STATE_SIZE
+from quadriga.shared.link.ticks import TickBatch, gathered
+from quadriga.shared.messages import Command, State, Ticks
+from quadriga.shared.robots.conventions import Array
+
+ROBOTS = ("r1", "r2", "r3")
+BEGUN = 1000.0
+
+
+class Clock:
+    now = BEGUN
+
+    def __call__(self) -> float:
+        return self.now
+
+
+rows = st.lists(
+    st.tuples(
+        st.sampled_from(ROBOTS),
+        st.integers(0, (1 << 42) - 1),
+        st.booleans(),
+        nps.arrays(np.float64, STATE_SIZE),
+    ),
+    max_size=40,
+)
+
+
+@given(rows)
+def test_what_was_gathered_comes_back(items: list[tuple[str, int, bool, Array]]) -> None:
+    clock = Clock()
+    batch, sent = TickBatch(ROBOTS, 1, clock), []
+    for place, (robot, tick, is_state, row) in enumerate(items):
+        at = BEGUN + 1e-3 * place
+        if is_state:
+            batch.add_state(robot, tick, row, at)
+            sent.append((f"team/{robot}/state", encode(State.from_row(tick, 10**6 * tick, row))))
+        else:
+            long = np.resize(row, COMMAND_SIZE)
+            batch.add_command(robot, tick, long, at)
+            of = Command.from_row(tick, 10**6 * tick, long)
+            sent.append((f"team/{robot}/command", encode(of)))
+    clock.now = BEGUN + 1.0
+    message = batch.take(5)
+    assert (message is None) == (not items)
+    assert batch.take(6) is None, "nothing is told twice"
+    if message is None:
+        return
+    came = list(gathered(encode(message)))
+    assert [(item.key("team"), encode(item.message)) for item in came] == sent
+    assert [item.age for item in came] == pytest.approx(
+        [1.0 - 1e-3 * place for place in range(len(items))]
+    )
+
+
+def test_more_than_there_is_room_for_is_kept() -> None:
+    batch = TickBatch(("r1",), 1)
+    for tick in range(100):
+        batch.add_command("r1", tick, np.full(COMMAND_SIZE, tick), 0.0)
+    message = batch.take(0)
+    assert message is not None
+    assert [item.message.tick for item in gathered(encode(message))] == list(range(100))
+    assert not batch.is_full
+    batch.add_state("r1", 0, np.zeros(STATE_SIZE), 0.0)
+    assert not batch.is_full
+
+
+@pytest.mark.parametrize(
+    "payload",
+    [
+        b"",
+        b"\x80",
+        encode(State(0, 0, *np.zeros((3, 12)), np.zeros(4), *np.zeros((2, 3)), np.zeros(4))),
+    ],
+)
+def test_what_is_no_batch_has_nothing_in_it(payload: bytes) -> None:
+    assert list(gathered(payload)) == []
+
+
+def test_a_robot_that_is_not_named_has_nothing_in_it() -> None:
+    forged = Ticks(
+        0, 0, ("r1",), np.full((2, 3 + STATE_SIZE), 1.0), np.empty((0, 3 + COMMAND_SIZE))
+    )
+    assert decode(encode(forged), Ticks).states.shape == (2, 3 + STATE_SIZE)
+    assert list(gathered(encode(forged))) == []
