@@ -25,9 +25,9 @@ _HEAD = """\
 
 The messages between the processes of a team. A key on the bus is `<team>/<robot>/<topic>` where a
 topic is one per robot, else `<team>/<topic>`; the planner and the sim server (or each robot's
-plant, `plant_r1` …) have a `status` under their own names. Every message also carries `tick` [ms]
-and `stamp_ns` [ns], the world's time of its content. Periods and ages are world time; the last
-column tells what is recorded.
+plant, `plant_r1` …) have a `status` and `ticks` under their own names. `state` and `command` go
+over the plant link, and are recorded out of `ticks`. Every message also carries `tick` [ms] and
+`stamp_ns` [ns], the world's time of its content. Periods and ages are world time.
 This page is generated: `python -m quadriga.shared.schema > docs/messages.md`.
 
 | topic | per robot | message | from | to | period | maximum age | recorded |
