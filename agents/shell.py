@@ -27,7 +27,7 @@ from quadriga.shared.link.agent_end import AgentEnd
 from quadriga.shared.link.ticks import TickBatch
 from quadriga.shared.messages import Command, Message, State
 from quadriga.shared.robots.conventions import Array
-from quadriga.shared.runtime.clock import monotonic, monotonic_ns
+from quadriga.shared.runtime.clock import log_ns, monotonic, monotonic_ns
 from quadriga.shared.runtime.scheduling import at_work
 from quadriga.shared.runtime.signals import interruptible
 from quadriga.shared.topics import (
@@ -124,7 +124,7 @@ class AgentShell:
         self._plain = PlainTicks(agent) if isinstance(agent, Agent) else None
         self._memory = agent.initial()
         # Tick, state and command of the last ones, for the recording if the plant is killed.
-        self._lately: deque[tuple[float, int, bytes, bytes]] = deque(maxlen=2 * TICKS_MS)
+        self._lately: deque[tuple[int, int, bytes, bytes]] = deque(maxlen=2 * TICKS_MS)
 
     def walk(self, stopped: Callable[[], bool]) -> None:
         """Answer every state until the walk is over.
@@ -206,7 +206,7 @@ class AgentShell:
         """Send the command of a tick, whose row is filled."""
         command = self._link.command
         self._link.send(command.stamp(tick, 1_000_000 * tick))
-        self._lately.append((monotonic(), tick, state.tobytes(), command.row.tobytes()))
+        self._lately.append((log_ns(), tick, state.tobytes(), command.row.tobytes()))
 
     def _step(
         self, memory: Any, state: State, acted: Acted | None = None, answered_ns: int = 0
