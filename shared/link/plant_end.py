@@ -166,6 +166,6 @@ class PlantEnd:
             if fault:
                 way.send(text_packet(REFUSED, text=fault))
                 return False
-            way.send(text_packet(WELCOME, self._places[name]))
             self.connected[name] = way
+            way.send(text_packet(WELCOME, self._places[name]))
         return True
