@@ -20,7 +20,7 @@ from quadriga.shared.bus.discovery import ProcessInfo, join, log
 from quadriga.shared.bus.liveness import Loss, find_lost_link, loss_error
 from quadriga.shared.bus.session import HERE, POLL, READY, Bus
 from quadriga.shared.codec import encode
-from quadriga.shared.codes import LEAD_GONE
+from quadriga.shared.codes import LEAD_GONE, LINK_LOST
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import PEER_TIMEOUT
 from quadriga.shared.link.agent_end import AgentEnd
@@ -130,7 +130,7 @@ class AgentShell:
         """Answer every state until the walk is over.
 
         Raises:
-            ProcessError: the plant has vanished.
+            ProcessError: the plant, or the link to the router, has vanished.
         """
         inbox, link, walks = self._inbox, self._link, False
         while not (stopped() or link.ended):
@@ -152,6 +152,8 @@ class AgentShell:
             state = inbox.pop_state()
             if state is not None:
                 self._memory = self._step(self._memory_now(), state)
+        if link.ended == LINK_LOST:
+            self._end_without_plant()
 
     def _memory_now(self) -> Any:
         """What the agent remembers: behind the plain ticks since its last step, if there are."""
@@ -250,14 +252,17 @@ class AgentShell:
         Raises:
             ProcessError: always.
         """
-        robot, tick = self._agent.robot, 0
+        config, robot, tick = self._config, self._agent.robot, 0
         batch = TickBatch((robot,), len(self._lately) + 1)
         for at, tick, state, command in self._lately:
             batch.add_state(robot, tick, np.frombuffer(state), at)
             batch.add_command(robot, tick, np.frombuffer(command), at)
         self._publish(TICKS, batch.take(tick))
+        loss = find_lost_link(self._bus, config)
+        if loss is None and self._link.ended:
+            loss = Loss(LINK_LOST, f"link of {self._link.plant} to the router")
         name = f"process {self._link.plant} of team {self._bus.team!r}, seen by {robot}"
-        raise loss_error(find_lost_link(self._bus, self._config) or Loss(LEAD_GONE, name), tick)
+        raise loss_error(loss or Loss(LEAD_GONE, name), tick)
 
     def _await_messages(self, tick: int, expected: Expected) -> None:
         """Wait for the messages that a step expects.
