@@ -224,7 +224,7 @@ class AgentShell:
         expected = self._agent.expected(tick)
         if self._lockstep and expected is not NOTHING:
             self._await_messages(tick, expected)
-        inputs = self._inbox.pop_inputs(state, expected)
+        inputs = self._inbox.pop_inputs(state, expected, answered=acted is not None)
         if acted is not None and self._plain is not None:
             after, outputs = self._plain.agent.finish_step(memory, inputs, acted)
         else:
