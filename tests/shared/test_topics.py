@@ -63,7 +63,7 @@ def test_an_agent_takes_what_the_table_says(kind: str, estimator: str, mode: str
 
 
 def test_every_message_type_has_a_row_and_every_row_a_name() -> None:
-    """Events have three rows: only those of the plant, not of agents or launcher, may end a walk."""
+    """Events have three rows: only those of plants, not of agents or launcher, may end a walk."""
     others = (AGENT_EVENT, INJECTED)
     types = [topic.type.__name__ for topic in TABLE if topic not in others]
     kinds = {*Message.__subclasses__(), *Flat.__subclasses__()} - {Flat}
