@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from quadriga.shared.codec import decode
+from quadriga.shared.codec import MAX_TICK, decode
 from quadriga.shared.errors import MessageError
 from quadriga.shared.link.packets import COMMAND_SIZE, STATE_SIZE
 from quadriga.shared.messages import Command, Flat, State, Ticks
@@ -16,6 +16,7 @@ from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.topics import COMMAND, STATE, Topic
 
 _BEFORE: Final = 3  # numbers in front of a row: the robot, its tick, and when
+_OLDEST: Final = 1e9  # s, of what is believed
 _PER_TICK: Final = 4  # rows of a robot in a tick that there is room for; more are sent at once
 
 
@@ -107,19 +108,19 @@ class _Rows:
 
 
 def gathered(payload: bytes) -> Iterator[Gathered]:
-    """The states and commands of a batch, oldest first; nothing of bytes that are none."""
+    """The states and commands of a batch, oldest first; nothing of what is none."""
     try:
         ticks = decode(payload, Ticks)
     except MessageError:
         return
     parts = (STATE, State, ticks.states), (COMMAND, Command, ticks.commands)
+    most = len(ticks.robots) - 1, MAX_TICK - 1, _OLDEST
     found = [
-        (row[2], topic, kind, robot, row)
+        (*row[:_BEFORE].tolist(), topic, kind, row)
         for topic, kind, rows in parts
-        for robot, row in zip(rows[:, 0].astype(int).tolist(), rows, strict=True)
+        for row in rows[((rows[:, :_BEFORE] >= 0) & (rows[:, :_BEFORE] <= most)).all(axis=1)]
     ]
-    for age, topic, kind, robot, row in sorted(found, key=lambda item: -item[0]):
-        if 0 <= robot < len(ticks.robots):
-            tick = int(row[1])
-            message = kind.from_row(tick, 1_000_000 * tick, row[_BEFORE:])
-            yield Gathered(topic, ticks.robots[robot], message, float(age))
+    for robot, at, age, topic, kind, row in sorted(found, key=lambda item: -item[2]):
+        tick = int(at)
+        message = kind.from_row(tick, 1_000_000 * tick, row[_BEFORE:])
+        yield Gathered(topic, ticks.robots[int(robot)], message, age)

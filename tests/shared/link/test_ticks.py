@@ -87,9 +87,14 @@ def test_what_is_no_batch_has_nothing_in_it(payload: bytes) -> None:
     assert list(gathered(payload)) == []
 
 
-def test_a_robot_that_is_not_named_has_nothing_in_it() -> None:
-    forged = Ticks(
-        0, 0, ("r1",), np.full((2, 3 + STATE_SIZE), 1.0), np.empty((0, 3 + COMMAND_SIZE))
-    )
-    assert decode(encode(forged), Ticks).states.shape == (2, 3 + STATE_SIZE)
-    assert list(gathered(encode(forged))) == []
+@pytest.mark.parametrize(
+    ("place", "wrong"),
+    [*((0, w) for w in (1, -1, 1e300)), *((k, w) for k in (0, 1, 2) for w in (-1, np.nan, 1e300))],
+)
+def test_a_row_that_none_can_be_is_passed_over(place: int, wrong: float) -> None:
+    """It is of a robot that is not named, or of a time that is none."""
+    states = np.zeros((3, 3 + STATE_SIZE))
+    states[1, place] = wrong
+    forged = Ticks(0, 0, ("r1",), states, np.empty((0, 3 + COMMAND_SIZE)))
+    assert np.array_equal(decode(encode(forged), Ticks).states, states, equal_nan=True)
+    assert len(list(gathered(encode(forged)))) == 2
