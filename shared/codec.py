@@ -6,7 +6,7 @@ takes any order, checks every field and gives arrays as read-only views.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from math import isfinite, prod
 from typing import Any, Final, TypeVar
@@ -45,7 +45,7 @@ def encode(message: Message) -> bytes:
     """The wire form of a message. Equal messages give equal bytes. Nothing is checked."""
     layout = _layout(type(message))
     if layout.flat is not None and isinstance(message, Flat):
-        return layout.flat.write(message.tick, message.stamp_ns, message.row)
+        return layout.flat.write([message.tick], message.row[None], message.stamp_ns)[0]
     body: dict[str, Any] = {"schema": message.SCHEMA}
     for name in layout.plain:
         body[name] = getattr(message, name)
@@ -53,6 +53,15 @@ def encode(message: Message) -> bytes:
         body[name] = np.ascontiguousarray(getattr(message, name), dtype=_FLOAT64).tobytes()
     packed: bytes = msgpack.packb(body)
     return packed
+
+
+def encode_rows(kind: type[Flat], ticks: Sequence[int], rows: Array) -> list[bytes]:
+    """What `encode` gives for the messages of these ticks and rows, (n, size of a row).
+
+    Stamps are those of the ticks. A recorder writes thousands a second.
+    """
+    flat = _layout(kind).flat
+    return [] if flat is None or not ticks else flat.write(ticks, rows)
 
 
 def decode(payload: bytes, kind: type[M]) -> M:
@@ -156,27 +165,33 @@ _LAYOUTS: Final[dict[type[Message], _Layout]] = {}
 
 
 class _FlatLayout:
-    """The bytes of a type whose numbers are all in one row: only they, tick and stamp differ.
-
-    A recorder writes thousands of these a second.
-    """
+    """The bytes of a type whose numbers are all in one row: only they, tick and stamp differ."""
 
     def __init__(self, kind: type[Flat]) -> None:
         self.kind: Any = kind
         self._cuts = {n: slice(8 * c.start, 8 * c.stop) for n, c in kind.CUTS.items()}  # bytes
         empty = msgpack.packb({"schema": kind.SCHEMA, "tick": 0})
         self._head: bytes = bytes([empty[0] + 1 + len(self._cuts)]) + empty[1:-1]  # of a larger map
-        # What precedes the numbers of each field: its name, and how many bytes they are.
-        sizes = {name: cut.stop - cut.start for name, cut in self._cuts.items()}
-        self._names = [msgpack.packb({n: bytes(size)})[1:-size] for n, size in sizes.items()]
+        # What follows the stamp: each field's name, and its numbers, here zeros.
+        body, self._places = b"", list[slice]()
+        for name, cut in self._cuts.items():
+            body += msgpack.packb({name: bytes(cut.stop - cut.start)})[1:]
+            self._places.append(slice(len(body) - (cut.stop - cut.start), len(body)))
+        self._body: Any = np.frombuffer(body, np.uint8)
 
-    def write(self, tick: int, stamp_ns: int, row: Array) -> bytes:
-        """The message's bytes, those of MessagePack."""
-        raw = np.ascontiguousarray(row, _FLOAT64).tobytes()
-        parts = [self._head, msgpack.packb(tick), _STAMP, msgpack.packb(stamp_ns)]
-        for name, cut in zip(self._names, self._cuts.values(), strict=True):
-            parts += (name, raw[cut])
-        return b"".join(parts)
+    def write(self, ticks: Sequence[int], rows: Array, stamp_ns: int | None = None) -> list[bytes]:
+        """The messages' bytes, those of MessagePack; the stamps are those of the ticks, or this."""
+        raw, size = np.ascontiguousarray(rows, _FLOAT64).view(np.uint8), len(self._body)
+        bodies = np.empty((len(rows), size), np.uint8)
+        bodies[:] = self._body
+        for place, cut in zip(self._places, self._cuts.values(), strict=True):
+            bodies[:, place] = raw[:, cut]
+        numbers, pack, written = bodies.tobytes(), msgpack.packb, list[bytes]()
+        for k, tick in enumerate(ticks):
+            stamp = pack(1_000_000 * tick if stamp_ns is None else stamp_ns)
+            parts = self._head, pack(tick), _STAMP, stamp, numbers[k * size : (k + 1) * size]
+            written.append(b"".join(parts))
+        return written
 
     def read(self, body: Mapping[str, Any]) -> Array | None:
         """The row of a map's arrays; None if one is none, or not of its size, or not finite."""

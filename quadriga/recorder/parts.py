@@ -7,18 +7,15 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, Self
+from typing import Self
 
 from quadriga.shared.errors import RecordingError
-from quadriga.shared.messages import Message
 from quadriga.shared.recording.quota import Quota
 from quadriga.shared.recording.reader import name_of
 from quadriga.shared.recording.ticks import lost_by_key
 from quadriga.shared.recording.writer import CHUNK_KIB, MESSAGE_SIZE, RecordingWriter
 from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.topics import STATE
-
-_LARGEST: Final = 768  # bytes of a state or a command in a file, at most
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,9 +73,9 @@ class Parts:
         self._make_room(len(payload) + MESSAGE_SIZE)
         self._writer.write(key, payload, log_time_ns)
 
-    def write_all(self, messages: Sequence[tuple[str, Message, int]]) -> None:
-        """Append messages, each with its key and its log time."""
-        self._make_room(_LARGEST * len(messages))
+    def write_all(self, messages: Sequence[tuple[str, int, int, bytes]]) -> None:
+        """Append messages of a plant link: key, tick, log time, payload."""
+        self._make_room(sum(MESSAGE_SIZE + len(payload) for *_, payload in messages))
         self._writer.write_all(messages)
 
     def _make_room(self, size: int) -> None:

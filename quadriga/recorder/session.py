@@ -158,14 +158,13 @@ class Session:
 
         What an agent has gathered counts only where its plant was killed before it told the same.
         """
-        team, robot = self._bus.team, find_topic(key)[1]
+        robot, recorded = find_topic(key)[1], self._keys
         told = self._parts.ticks if robot in self._robots else {}
-        items = ((item.key(team), item.message, item.log_ns) for item in gathered(payload))
         self._parts.write_all(
             [
-                (of, message, log_time)
-                for of, message, log_time in items
-                if self._keys(of) and message.tick > told.get(of, -1)
+                (item.key, item.tick, item.log_ns, item.payload)
+                for item in gathered(self._bus.team, payload)
+                if recorded(item.key) and item.tick > told.get(item.key, -1)
             ]
         )
 

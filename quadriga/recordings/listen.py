@@ -13,7 +13,7 @@ from typing import Final
 from quadriga.recordings.key_patterns import KeyPattern, key_patterns
 from quadriga.recordings.readable import open_readable
 from quadriga.shared.bus.session import POLL, Bus
-from quadriga.shared.codec import encode, envelope
+from quadriga.shared.codec import envelope
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import RecordingError
 from quadriga.shared.link.ticks import gathered
@@ -82,10 +82,9 @@ def entries_from_bus(
                     head = envelope(payload)
                     yield ChunkEntry(key, -1 if head is None else head[0], now, payload)
                 if key.endswith(f"/{TICKS.name}"):
-                    for item in gathered(payload):
-                        if _matches(patterns, of := item.key(team)):
-                            tick, sent = item.message.tick, encode(item.message)
-                            yield ChunkEntry(of, tick, item.log_ns, sent)
+                    for item in gathered(team, payload):
+                        if _matches(patterns, item.key):
+                            yield ChunkEntry(item.key, item.tick, item.log_ns, item.payload)
 
 
 def _matches(patterns: Sequence[KeyPattern], key: str) -> bool:

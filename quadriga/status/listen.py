@@ -14,7 +14,7 @@ from quadriga.doctor.watch_team import WalkEnd
 from quadriga.shared.bus.diagnostics import TeamView, processes
 from quadriga.shared.bus.discovery import ask, describe_process, view_of
 from quadriga.shared.bus.session import HERE, Arrival, Bus
-from quadriga.shared.codec import encode, envelope
+from quadriga.shared.codec import envelope
 from quadriga.shared.config.sections import Config
 from quadriga.shared.link.ticks import gathered
 from quadriga.shared.members import OBSERVER
@@ -66,9 +66,8 @@ class TeamListener:
             for at_ns, key, payload in sorted(arrived, key=lambda arrival: arrival[0]):
                 head = envelope(payload)
                 self._fold.add(key, payload, -1 if head is None else head[0], at_ns)
-                for item in gathered(payload) if key.endswith(f"/{TICKS.name}") else ():
-                    of, tick = item.key(self._bus.team), item.message.tick
-                    self._fold.add(of, encode(item.message), tick, at_ns)
+                for item in gathered(self._bus.team, payload) if _is_batch(key) else ():
+                    self._fold.add(item.key, item.payload, item.tick, at_ns)
 
     def look(self) -> TeamStatus:
         """How the team is now, by what was heard since the last look."""
@@ -133,6 +132,10 @@ def listening(
         listener = TeamListener(config, bus, every_topic=every_topic)
         bus.wait_for_link(_LINK_TIMEOUT, stopped)
         yield listener
+
+
+def _is_batch(key: str) -> bool:
+    return key.endswith(f"/{TICKS.name}")
 
 
 def _is_covered(key: str, keys: Collection[str]) -> bool:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Final
 
 from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.codec import decode
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
-from quadriga.shared.link.ticks import gathered
-from quadriga.shared.messages import Event
+from quadriga.shared.link.ticks import LinkMessage, gathered
+from quadriga.shared.messages import Event, State
 from quadriga.shared.runtime.clock import Rate, monotonic
 from quadriga.shared.topics import (
     AGENT_EVENT,
@@ -83,10 +84,14 @@ class _Feed:
         return bool(arrived)
 
     def _take_ticks(self, key: str, payload: bytes, now: float) -> None:
-        team = key.partition("/")[0]
-        for item in gathered(payload):
-            self.traffic.note(_short(item.key(team)), 1, item.message.tick, now)
-            self.gatherer.take(item.message, item.robot)
+        newest = dict[str, LinkMessage]()
+        for item in gathered(key.partition("/")[0], payload):
+            self.traffic.note(_short(item.key), 1, item.tick, now)
+            if item.topic is STATE:
+                newest[item.robot] = item
+        for robot, item in newest.items():
+            with suppress(MessageError):  # of a sensor that says what is no number
+                self.gatherer.take(decode(item.payload, State), robot)
 
 
 def _short(key: str) -> str:

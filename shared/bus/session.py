@@ -175,7 +175,7 @@ class Bus:
             pause()
 
     def publisher(self, key: str, *, waits: bool = True) -> Callable[[bytes], None]:
-        """A function that sends a payload on `key` at once.
+        """A function that sends a payload on `key`.
 
         Args:
             key: the full key, `<team>/…`.
@@ -341,8 +341,9 @@ class Bus:
         self, key: str, waits: bool, priority: zenoh.Priority
     ) -> Callable[[bytes], None]:
         control = zenoh.CongestionControl.BLOCK if waits else zenoh.CongestionControl.DROP
+        express = waits or priority is not zenoh.Priority.DATA  # see `_COMMON` of the settings
         publisher = self._session.declare_publisher(
-            key, express=True, congestion_control=control, priority=priority
+            key, express=express, congestion_control=control, priority=priority
         )
         self._declarations.append(publisher)
         put: Callable[[bytes], None] = publisher.put

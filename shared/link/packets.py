@@ -25,6 +25,7 @@ from typing import Final
 import numpy as np
 
 from quadriga.shared.messages import Command, Flat, State
+from quadriga.shared.printable import printable_line
 from quadriga.shared.robots.conventions import Array
 
 VERSION: Final = 1
@@ -91,8 +92,8 @@ class PacketBuffer:
         return fault_of(self.view[:size])
 
     def text(self, size: int) -> str:
-        """The text of a packet of `size` bytes."""
-        return self.view[HEADER.size : size].tobytes().decode("utf-8", "replace")
+        """The text of a packet of `size` bytes, fit for a terminal."""
+        return printable_line(self.view[HEADER.size : size].tobytes().decode("utf-8", "replace"))
 
 
 def text_packet(kind: int, robot: int = 0, text: str = "") -> bytes:

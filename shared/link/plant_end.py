@@ -166,6 +166,6 @@ class PlantEnd:
             if fault:
                 way.send(text_packet(REFUSED, text=fault))
                 return False
-            self.connected[name] = way
+            self.connected[name] = way  # first: who is welcome is there
             way.send(text_packet(WELCOME, self._places[name]))
         return True

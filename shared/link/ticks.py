@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from quadriga.shared.codec import MAX_INTEGER, decode
+from quadriga.shared.codec import MAX_INTEGER, MAX_TICK, decode, encode_rows
 from quadriga.shared.errors import MessageError
 from quadriga.shared.link.packets import COMMAND_SIZE, STATE_SIZE
-from quadriga.shared.messages import Command, Flat, State, Ticks
+from quadriga.shared.messages import Command, State, Ticks
 from quadriga.shared.robots.conventions import Array
 from quadriga.shared.topics import COMMAND, STATE, Topic
 
 _BEFORE: Final = 3  # numbers in front of a row: the robot, its tick, and when
+_LONGEST_NS: Final = 10**15  # of a batch: it is sent after some ms
 _PER_TICK: Final = 4  # rows of a robot in a tick that there is room for; more are sent at once
 
 
@@ -22,20 +23,20 @@ class LinkMessage(NamedTuple):
     """A state or a command out of a batch.
 
     Attributes:
+        log_ns: when it was sent, or taken in, ns since 1970.
         topic: `STATE` or `COMMAND`.
         robot: its robot's name.
-        message: itself.
-        log_ns: when it was sent, or taken in, ns since 1970.
+        key: under which it is known.
+        tick: its own.
+        payload: the message as `encode` writes it.
     """
 
+    log_ns: int
     topic: Topic
     robot: str
-    message: Flat
-    log_ns: int
-
-    def key(self, team: str) -> str:
-        """The key under which it is known."""
-        return self.topic.key(team, self.robot)
+    key: str
+    tick: int
+    payload: bytes
 
 
 class TickBatch:
@@ -106,21 +107,26 @@ class _RowBuffer:
         return rows
 
 
-def gathered(payload: bytes) -> Iterator[LinkMessage]:
-    """The states and commands of a batch, oldest first; nothing of bytes that are none."""
+def gathered(team: str, payload: bytes) -> list[LinkMessage]:
+    """The states and commands of a batch, oldest first; none of what is no batch, or no row."""
     try:
         ticks = decode(payload, Ticks)
     except MessageError:
-        return
-    parts = (STATE, State, ticks.states), (COMMAND, Command, ticks.commands)
-    found = [
-        (row[2], topic, kind, robot, row)
-        for topic, kind, rows in parts
-        for robot, row in zip(rows[:, 0].astype(int).tolist(), rows, strict=True)
-    ]
-    for after, topic, kind, robot, row in sorted(found, key=lambda item: item[0]):
-        if 0 <= robot < len(ticks.robots):
-            tick = int(row[1])
-            message = kind.from_row(tick, 1_000_000 * tick, row[_BEFORE:])
-            log_ns = ticks.begun_ns + int(after)
-            yield LinkMessage(topic, ticks.robots[robot], message, log_ns)
+        return []
+    found, most = list[LinkMessage](), (len(ticks.robots) - 1, MAX_TICK - 1, _LONGEST_NS)
+    for topic, kind, given in (STATE, State, ticks.states), (COMMAND, Command, ticks.commands):
+        valid = (given[:, :_BEFORE] >= 0) & (given[:, :_BEFORE] <= most)
+        rows = given if valid.all() else given[valid.all(axis=1)]
+        heads = rows[:, :_BEFORE].astype(np.int64).tolist()
+        keys = [topic.key(team, robot) for robot in ticks.robots]
+        payloads = encode_rows(kind, [tick for _, tick, _ in heads], rows[:, _BEFORE:])
+        found += [
+            LinkMessage(ticks.begun_ns + after, topic, ticks.robots[place], keys[place], tick, sent)
+            for (place, tick, after), sent in zip(heads, payloads, strict=True)
+        ]
+    found.sort(key=_time_of)
+    return found
+
+
+def _time_of(message: LinkMessage) -> int:
+    return message.log_ns

@@ -15,9 +15,8 @@ from typing import Any, Final
 
 from mcap.writer import CompressionType
 
-from quadriga.shared.codec import encode, envelope
+from quadriga.shared.codec import envelope
 from quadriga.shared.errors import RecordingError, name_file_errors
-from quadriga.shared.messages import Message
 from quadriga.shared.recording.block_writer import BlockWriter, RecordedMessage
 from quadriga.shared.recording.metadata import CHANNELS, COUNTS, LOST, PROFILE, seal
 from quadriga.shared.recording.quota import OVERSIZED, REFUSED, Quota
@@ -116,11 +115,9 @@ class RecordingWriter:
         tick, publish_time = envelope(payload) or (-1, log_time_ns)
         self._write([(key, tick, publish_time, log_time_ns, payload)])
 
-    def write_all(self, messages: Iterable[tuple[str, Message, int]]) -> None:
-        """Append messages that are encoded here, each with its key and its log time."""
-        self._write(
-            [(key, m.tick, m.stamp_ns, log_time, encode(m)) for key, m, log_time in messages]
-        )
+    def write_all(self, messages: Iterable[tuple[str, int, int, bytes]]) -> None:
+        """Append messages of a plant link: key, tick, log time, payload."""
+        self._write((key, tick, 1_000_000 * tick, at, sent) for key, tick, at, sent in messages)
 
     def _write(self, messages: Iterable[tuple[str, int, int, int, bytes]]) -> None:
         """Append messages: key, tick, publish time, log time, payload."""

@@ -6,7 +6,7 @@ import json
 import socket
 from itertools import cycle
 from pathlib import Path
-from typing import Final
+from typing import Final, cast
 
 import numpy as np
 
@@ -16,24 +16,32 @@ from quadriga.drive.client import ControlLink
 from quadriga.drive.driver_words import read_driver_word
 from quadriga.drive.gamepad import EVENT_BYTES, Gamepad, take, wish_of
 from quadriga.drive.wish import standing
-from quadriga.plant.commands import CommandBox
+from quadriga.plant.server import REFUSED
 from quadriga.recordings.echo import format_entry
 from quadriga.shared.about import About
 from quadriga.shared.bus.diagnostics import MemberAnswer, TeamView, describe_absent, diagnose
 from quadriga.shared.bus.discovery import describe_process, read_about
+from quadriga.shared.bus.session import Bus
 from quadriga.shared.codec import decode, encode, envelope
 from quadriga.shared.config.load import load
+from quadriga.shared.errors import MessageError
+from quadriga.shared.link import packets as packet_kinds
+from quadriga.shared.link.agent_end import AgentEnd
+from quadriga.shared.link.connections import link_key
+from quadriga.shared.link.packets import END, HELLO, STATE_SIZE, WELCOME, RowPacket, text_packet
+from quadriga.shared.link.ticks import gathered
 from quadriga.shared.members import SIM, team_members
-from quadriga.shared.messages import LiveFault
+from quadriga.shared.messages import LiveFault, State
 from quadriga.shared.printable import printable_line
 from quadriga.shared.recording.reader import ChunkEntry
-from quadriga.shared.topics import TABLE
+from quadriga.shared.topics import STATE, TABLE
 from quadriga.sim_server.world.faults import KINDS as FAULT_KINDS
 from quadriga.sim_server.world.faults import build_components, parse_faults, with_time
 from quadriga.status.gather import StatusFold
 from tests.a1 import standing as standing_state
 from tests.fuzz.damage import damage
 from tests.fuzz.target import Reader, change_json, example
+from tests.plant.test_server import command, served
 
 _EVERYTHING: Final = Expected((1 << 40, 0), 1 << 40, 1 << 40, True)
 _LOOK_EVERY: Final = 100  # messages
@@ -45,7 +53,6 @@ class Messages:
     def __init__(self, _folder: Path) -> None:
         config = load(None, {"team.robots": 2, "estimator.kind": "truth"})
         self._inbox = Inbox(config, "r1", ("r2",))
-        self._box = CommandBox(config.team.name, ("r1", "r2"), config.robot)
         self._fold, self._heard = StatusFold(config), 0
         self._good = [(topic, encode(example(topic.type))) for topic in TABLE]
         self._topic = TABLE[0]
@@ -57,7 +64,6 @@ class Messages:
     def read(self, content: bytes) -> None:
         for robot in ("r1", "r2"):
             self._inbox.take(self._topic.key("team", robot), content)
-            self._box.take(self._topic.key("team", robot), content, tick=1 << 20, oldest=0)
         while self._inbox.pop_state() is not None:
             pass
         self._inbox.pop_inputs(standing_state(0), _EVERYTHING)
@@ -70,7 +76,38 @@ class Messages:
             self._fold.look(self._heard)
         line = format_entry(entry, full=True)
         assert line == printable_line(line)
+        for item in gathered(content):
+            encode(item.message)
+            assert self._heard - round(1e9 * item.age) >= -(1 << 62)
         decode(content, self._topic.type)
+
+
+def packets(_folder: Path) -> Reader:
+    """What a plant and an agent send each other over the bus; the plant tells what it refuses."""
+    server, bus = served()
+    server.publish()
+    agent, inbox = AgentEnd(server.config, "r1", cast("Bus", bus)), Inbox(server.config, "r1", ())
+    plant_says = bus.heard[link_key("team", "r1", STATE)]
+    plant_says(text_packet(WELCOME))
+    agent.open(lambda: False)
+    state = RowPacket(packet_kinds.STATE, 0, STATE_SIZE)
+    texts = (text_packet(HELLO, 0, "r1"), text_packet(END, 0, "time-over"))
+    good = (command(0), bytes(state.stamp(5, 5_000_000)), *texts)
+
+    def read(content: bytes) -> None:
+        plant_says(content)
+        if agent.receive(wait=False):
+            got = agent.received
+            inbox.take_state(State.from_row(got.tick, got.stamp_ns, got.state.copy()))
+            inbox.pop_state()
+        assert agent.ended == printable_line(agent.ended)
+        agent.ended = ""
+        server.commands.latest.clear()
+        bus.answer(content)
+        if server.receive("r1", 0, wait=False) == REFUSED:
+            raise MessageError("packet", server.commands.refused["r1"], "a command")
+
+    return Reader(good, read)
 
 
 def answers(_folder: Path) -> Reader:

@@ -26,6 +26,7 @@ from tests.fuzz.target import Reader, Target
 
 KINDS: Final[Mapping[str, Callable[[Path], Target]]] = {
     "messages": messages.Messages,
+    "packets": messages.packets,
     "answers": messages.answers,
     "orders": messages.orders,
     "drivers": messages.drivers,
@@ -51,7 +52,11 @@ KINDS: Final[Mapping[str, Callable[[Path], Target]]] = {
 # Inputs of those kinds that most of the time is for, and the share of all inputs that is refused at
 # least: damage that nobody notices shows nothing. What walks say in messages that decode is read.
 INPUTS = {"messages": 600, "configurations": 160, "predictors": 80, "recordings": 40}
-INPUTS |= {"certificates": 200, "authorities": 200}  # whose keys are others each time
+INPUTS |= {
+    "packets": 600,
+    "certificates": 200,
+    "authorities": 200,
+}  # whose keys are others each time
 FEW = 20
 REFUSED = 0.25
 READ = ("traces", "exports", "replays", "realtime-replays")

@@ -14,6 +14,7 @@ from quadriga.certs.folder import CertificateFolder
 from quadriga.doctor.examine import examine
 from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.errors import BusError, ConfigError
+from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.security.certificates import TlsFiles, tls_files
 from tests.runtime.fortress import LONG_AGO, NOW, WAIT, Fortress, make_fortress, serving, stranger
 
@@ -43,15 +44,15 @@ def recorder(fortress: Fortress) -> Iterator[Bus]:
         yield bus
 
 
-def heard(fortress: Fortress, recorder: Bus, session: zenoh.Session | None = None) -> set[str]:
-    """The keys of all that has been let through until now."""
+def heard(fortress: Fortress, hearer: Bus, session: zenoh.Session | None = None) -> set[str]:
+    """The keys of all that has been let through until now to who hears the emergency stop."""
     if session is not None:  # its own question arrives behind what it has sent
-        for _ in session.get("team/recorder/received", timeout=WAIT):
+        for _ in session.get(f"team/{hearer.name}/received", timeout=WAIT):
             pass
     with fortress.bus("estop") as bus:
         bus.publisher("team/estop")(LAST)
         keys = set[str]()
-        while (packet := recorder.get(WAIT)) != ("team/estop", LAST):
+        while (packet := hearer.get(WAIT)) != ("team/estop", LAST):
             assert packet, "the last word never came"
             keys.add(packet[0])
     return keys
@@ -65,17 +66,32 @@ def test_foreign_keys_are_refused(fortress: Fortress, recorder: Bus, thief: str)
         assert heard(fortress, recorder, session) == set()
 
 
+@pytest.mark.parametrize("thief", ["r2", "operator", "recorder"])
+def test_nobody_commands_a_robot_but_its_own_agent(fortress: Fortress, thief: str) -> None:
+    with fortress.bus("sim") as sim, stranger(fortress, fortress.files(thief)) as session:
+        for key in ("team/@link/*/command", "team/estop"):
+            sim.subscribe(key)
+        for name in 20 * ("r1", "r2"):
+            key = f"team/@link/{name}/command"
+            session.put(key, bytes(50), congestion_control=zenoh.CongestionControl.BLOCK)
+        own = {"team/@link/r2/command"} if thief == "r2" else set()
+        assert heard(fortress, sim, session) == own
+
+
 def test_who_is_let_in_hears_what_is_its_own_alone(fortress: Fortress, recorder: Bus) -> None:
+    own, others = "team/@link/r2/state", ("**", "team/**", "team/@link/**", "team/@link/*/state")
     with fortress.bus("sim") as sim, stranger(fortress, fortress.files("r2")) as session:
-        stolen = [session.declare_subscriber(key) for key in ("**", "team/**", "team/*/state")]
-        own = session.declare_subscriber("team/r2/state")
-        states = [sim.publisher(f"team/{name}/state") for name in ("r1", "r2")]
-        while "team/r2/state" not in heard(fortress, recorder, session):
+        stolen = [session.declare_subscriber(key) for key in (*others, "team/@link/r1/state")]
+        heard_own, deadline = session.declare_subscriber(own), monotonic() + WAIT
+        states = [sim.publisher(f"team/@link/{name}/state") for name in ("r1", "r2")]
+        while (sample := heard_own.try_recv()) is None:
+            assert monotonic() < deadline
             for put in states:
                 put(bytes(50))
-        assert str(own.recv().key_expr) == "team/r2/state"
+            assert heard(fortress, recorder) == set(), "no wildcard takes in a plant link"
+        assert str(sample.key_expr) == own
         samples = [sample for each in stolen for sample in iter(each.try_recv, None)]
-        assert {str(sample.key_expr) for sample in samples} <= {"team/r2/state"}
+        assert {str(sample.key_expr) for sample in samples} <= {own}
 
 
 def test_forged_presence_is_seen_by_nobody(fortress: Fortress, recorder: Bus) -> None:

@@ -18,9 +18,9 @@ from quadriga.shared.runtime.clock import monotonic, sleep
 from quadriga.team.endpoint import free_endpoint
 
 WAIT = 30.0  # s
-KEY = "team/r1/state"
-PAYLOAD = bytes(700)  # of a state, nearly
-COUNT = 400  # 0.2 s of the states of two robots
+KEY = "team/sim/ticks"
+PAYLOAD = bytes(9500)  # of what goes over a robot's link in 10 ticks, nearly
+COUNT = 40  # 0.4 s of it
 
 
 def starved(config: Config, told: Event, sent: Event, heard: Event) -> None:
@@ -32,7 +32,7 @@ def starved(config: Config, told: Event, sent: Event, heard: Event) -> None:
         schedule_others(os.SCHED_IDLE)
         for _ in range(COUNT):
             put(PAYLOAD)
-            sleep(0.0005)
+            sleep(0.01)
         schedule_others(os.SCHED_OTHER)
         sent.set()
         heard.wait(WAIT)

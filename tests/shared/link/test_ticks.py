@@ -46,8 +46,8 @@ def test_what_was_gathered_comes_back(items: list[tuple[str, int, bool, Array]])
     assert batch.take(6) is None, "nothing is told twice"
     if message is None:
         return
-    came = list(gathered(encode(message)))
-    assert [(item.key("team"), encode(item.message)) for item in came] == sent
+    came = gathered("team", encode(message))
+    assert [(item.key, item.payload) for item in came] == sent
     assert [item.log_ns for item in came] == [BEGUN + 123_457 * k for k in range(len(items))]
 
 
@@ -57,7 +57,7 @@ def test_more_than_there_is_room_for_is_kept() -> None:
         batch.add_command("r1", tick, np.full(COMMAND_SIZE, tick), BEGUN)
     message = batch.take(0)
     assert message is not None
-    assert [item.message.tick for item in gathered(encode(message))] == list(range(100))
+    assert [item.tick for item in gathered("team", encode(message))] == list(range(100))
     assert not batch.is_full
     batch.add_state("r1", 0, np.zeros(STATE_SIZE), BEGUN)
     assert not batch.is_full
@@ -72,12 +72,17 @@ def test_more_than_there_is_room_for_is_kept() -> None:
     ],
 )
 def test_what_is_no_batch_has_nothing_in_it(payload: bytes) -> None:
-    assert list(gathered(payload)) == []
+    assert gathered("team", payload) == []
 
 
-def test_a_robot_that_is_not_named_has_nothing_in_it() -> None:
-    forged = Ticks(
-        0, 0, BEGUN, ("r1",), np.full((2, 3 + STATE_SIZE), 1.0), np.empty((0, 3 + COMMAND_SIZE))
-    )
-    assert decode(encode(forged), Ticks).states.shape == (2, 3 + STATE_SIZE)
-    assert list(gathered(encode(forged))) == []
+@pytest.mark.parametrize(
+    ("place", "wrong"),
+    [*((0, w) for w in (1, -1, 1e300)), *((k, w) for k in (0, 1, 2) for w in (-1, np.nan, 1e300))],
+)
+def test_a_row_that_none_can_be_is_passed_over(place: int, wrong: float) -> None:
+    """It is of a robot that is not named, or of a time that is none."""
+    states = np.zeros((3, 3 + STATE_SIZE))
+    states[1, place] = wrong
+    forged = Ticks(0, 0, BEGUN, ("r1",), states, np.empty((0, 3 + COMMAND_SIZE)))
+    assert np.array_equal(decode(encode(forged), Ticks).states, states, equal_nan=True)
+    assert len(gathered("team", encode(forged))) == 2

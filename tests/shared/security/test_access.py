@@ -8,6 +8,7 @@ import pytest
 
 from quadriga.shared.codec import MAX_BYTES
 from quadriga.shared.config.load import load
+from quadriga.shared.link.connections import link_key
 from quadriga.shared.runtime.places import SOURCE
 from quadriga.shared.security.access import (
     Rights,
@@ -17,7 +18,7 @@ from quadriga.shared.security.access import (
     team_identities,
     team_rights,
 )
-from quadriga.shared.topics import TABLE
+from quadriga.shared.topics import COMMAND, STATE, TABLE, Topic
 
 EACH = {"team.plant_per_robot": True, "world.mode": "realtime", "team.yokes": "none"}
 TWO = load(None, {"team.robots": 2})
@@ -28,12 +29,12 @@ def rights(**given: object) -> dict[str, Rights]:
 
 
 def test_a_robot_sends_under_its_own_key_and_hears_its_own_state() -> None:
-    own = {f"team/r1/{n}" for n in ["command", "measurement", "plan", "status", "inputs", "event"]}
-    assert {*rights()["r1"].publishes} == {*own, "team/estop"}
+    own = {f"team/r1/{n}" for n in ["measurement", "plan", "status", "inputs", "event", "ticks"]}
+    assert {*rights()["r1"].publishes} == {*own, "team/@link/r1/command", "team/estop"}
     of_all = {f"team/*/{name}" for name in ("plan", "measurement", "status")}
     of_team = {f"team/{name}" for name in ("reference", "estop", "stop", "reset", "resume")}
     world = {"team/sim/truth", "team/sim/event"}
-    assert {*rights()["r1"].hears} == {"team/r1/state", *of_all, *of_team, *world}
+    assert {*rights()["r1"].hears} == {"team/@link/r1/state", *of_all, *of_team, *world}
 
 
 @pytest.mark.parametrize(
@@ -61,15 +62,17 @@ def test_anyone_in_the_team_may_stop_it_and_who_only_hears_says_nothing() -> Non
 
 def test_the_world_speaks_for_all_robots_and_the_plant_of_one_for_it_alone() -> None:
     sent = {*rights()["sim"].publishes}
-    assert {"team/r1/state", "team/r2/state", "team/sim/status", "team/clock"} <= sent
+    of_link = {"team/@link/r1/state", "team/@link/r2/state"}
+    assert {*of_link, "team/sim/status", "team/sim/ticks", "team/clock"} <= sent
     assert not [key for key in sent if key.endswith(("command", "plan", "reference"))]
     found = rights(**EACH)
     assert "sim" not in found
     first, second = {*found["plant_r1"].publishes}, {*found["plant_r2"].publishes}
-    assert {"team/r2/state", "team/plant_r2/status"} <= second
-    assert not {"team/r1/state", "team/clock", "team/sim/truth"} & second
+    assert {"team/@link/r2/state", "team/plant_r2/status", "team/plant_r2/ticks"} <= second
+    of_first = {"team/@link/r1/state", "team/plant_r1/ticks"}
+    assert not {*of_first, "team/clock", "team/sim/truth"} & second
     assert "team/clock" in first
-    assert "team/r2/state" not in first
+    assert "team/@link/r2/state" not in first
 
 
 def keys_of(block: dict[str, Any], identity: str, flow: str) -> set[str]:
@@ -121,7 +124,13 @@ def test_nobody_takes_more_than_its_share_of_the_router() -> None:
     assert found["transport/unicast/max_sessions"] > len(team_identities(TWO))
 
 
+def key_of(team: str, robot: str, topic: Topic) -> str:
+    return topic.key(team, robot)
+
+
 def test_every_topic_has_somebody_who_may_send_it() -> None:
     for found in (rights(), rights(**EACH)):
         sent = {key for each in found.values() for key in each.publishes}
-        assert {topic.key("team", robot) for topic in TABLE for robot in ("r1", "r2")} <= sent
+        for topic in TABLE:
+            key = link_key if topic in (STATE, COMMAND) else key_of
+            assert {key("team", robot, topic) for robot in ("r1", "r2")} <= sent
