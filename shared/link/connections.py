@@ -107,7 +107,7 @@ class BusConnection:
             return CLOSED if self._is_gone() else NOTHING
         size = min(len(packet), len(into))
         into[:size] = packet[:size]
-        return size
+        return size or 1  # an empty one is no end: one byte is no packet either, and is refused
 
     def close(self) -> None:
         return

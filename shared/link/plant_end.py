@@ -167,6 +167,6 @@ class PlantEnd:
             if fault:
                 way.send(text_packet(REFUSED, text=fault))
                 return False
+            self.connected[name] = way  # first: who is welcome is there
             way.send(text_packet(WELCOME, self._places[name]))
-            self.connected[name] = way
         return True

@@ -3,64 +3,113 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any, cast
 
-import msgpack
 import numpy as np
 import pytest
 
 from quadriga.plant.process import _check_end
 from quadriga.plant.protocol import Plant
-from quadriga.plant.server import FALL_LINGER_MS, PlantServer
+from quadriga.plant.server import FALL_LINGER_MS, NEWER, REFUSED, PlantServer
 from quadriga.shared import codes
 from quadriga.shared.bus.session import Bus
-from quadriga.shared.codec import MAX_TEXT, decode, encode
+from quadriga.shared.codec import MAX_TEXT, decode
+from quadriga.shared.config.sections import PlantConfig
 from quadriga.shared.errors import ProcessError
+from quadriga.shared.link import packets
+from quadriga.shared.link.connections import link_key
+from quadriga.shared.link.packets import (
+    COMMAND_SIZE,
+    HEADER,
+    HELLO,
+    WELCOME,
+    RowPacket,
+    text_packet,
+)
+from quadriga.shared.link.ticks import gathered
 from quadriga.shared.messages import Clock, Command, Event, State
-from quadriga.shared.topics import CLOCK, COMMAND, EVENT, POSTURE, STATE, TRUTH
+from quadriga.shared.topics import CLOCK, COMMAND, EVENT, STATE, TICKS, TRUTH
 from quadriga.sim_server.world.world import World
 from tests.sim_server.standing import configured
 
+LINK, BATCHES = link_key("team", "r1", STATE), TICKS.key("team", "sim")
+
 
 class Listener:
-    """A bus that brings `arrived`, and keeps what is published: key, whether it waits, payload."""
+    """A bus that keeps what is published: key, whether it waits, payload; an agent may be on it."""
+
+    name = "sim"
 
     def __init__(self) -> None:
         self.packets: list[tuple[str, bool, bytes]] = []
-        self.arrived: list[tuple[str, bytes]] = []
+        self.heard: dict[str, Callable[[bytes], None]] = {}
 
-    def publisher(
-        self, key: str, *, droppable: bool = False, urgent: bool = False
-    ) -> Callable[[bytes], None]:
-        return lambda payload: self.packets.append((key, not (droppable or urgent), payload))
+    def publisher(self, key: str, *, waits: bool = True) -> Callable[[bytes], None]:
+        return lambda payload: self.packets.append((key, waits, payload))
+
+    def urgent_publisher(self, key: str) -> Callable[[bytes], None]:
+        return self.publisher(key, waits=False)
+
+    def hear(self, key: str, call: Callable[[bytes], None]) -> None:
+        self.heard[key] = call
+
+    def members_at(self, _stage: str) -> frozenset[str]:
+        return frozenset({"r1"})
 
     def drain(self) -> list[tuple[str, bytes]]:
-        arrived, self.arrived = self.arrived, []
-        return arrived
+        return []
+
+    def answer(self, packet: bytes) -> None:
+        """Send what the agent of r1 does."""
+        self.heard[link_key("team", "r1", COMMAND)](packet)
+
+    def payloads(self, key: str) -> list[bytes]:
+        return [payload for sent, _, payload in self.packets if sent == key]
 
     def events(self) -> list[Event]:
-        return [
-            decode(payload, Event) for key, _, payload in self.packets if key == "team/sim/event"
-        ]
+        return [decode(payload, Event) for payload in self.payloads("team/sim/event")]
 
 
-def served(**world: Any) -> tuple[PlantServer, Listener]:
-    config, listener = configured(**world), Listener()
-    return PlantServer(config, World(config), cast("Bus", listener)), listener
+def served(plant: Plant | None = None, **world: Any) -> tuple[PlantServer, Listener]:
+    """A plant whose link goes over the bus to the agent of r1."""
+    config, listener = replace(configured(**world), plant=PlantConfig("bus")), Listener()
+    server = PlantServer(config, plant or World(config), cast("Bus", listener))
+    server.link.open()
+    listener.answer(text_packet(HELLO, 0, "r1"))
+    return server, listener
+
+
+def command(tick: int, tau: float = 1.0) -> bytes:
+    packet = RowPacket(packets.COMMAND, 0, COMMAND_SIZE)
+    packet.row[0] = tau
+    return bytes(packet.stamp(tick, 10**6 * tick))
 
 
 @pytest.mark.parametrize(
-    "body",
-    [{"schema": "x" * 900_000}, {"schema": 1} | {f"key {i}": 0 for i in range(50_000)}],
-    ids=["text", "keys"],
+    ("packet", "error"),
+    [
+        (b"", "1 bytes, expected at least 32"),
+        (b"x" * 900_000, "version 30840 of the plant link"),
+        (command(0)[:-1], "511 bytes, expected 512"),
+        (text_packet(WELCOME, 0, "x" * 512), "a packet of kind 2, expected a command"),
+        (command(0, np.nan), "command.tau: got nan"),
+    ],
+    ids=["empty", "foreign", "short", "text", "not a number"],
 )
-def test_a_malformed_command_is_reported_in_few_words(body: dict[str, object]) -> None:
+def test_a_malformed_command_drives_no_robot_and_is_reported_in_few_words(
+    packet: bytes, error: str
+) -> None:
     server, listener = served()
-    server.commands.take(COMMAND.key("team", "r1"), msgpack.packb(body), tick=0, oldest=0)
+    server.publish()
+    listener.answer(packet)
+    assert server.receive("r1", 0, wait=False) == REFUSED
     server.step({})
     event = next(event for event in listener.events() if event.kind == "fault")
-    assert event.detail.startswith("1 commands dropped: command: got ")
+    assert (event.code, event.robot) == (codes.MALFORMED, "r1")
+    assert event.detail.startswith(f"1 commands dropped: {error}")
     assert len(event.detail) < 300
+    assert server.commands.latest == {}
 
 
 def test_what_is_announced_fits_an_event_and_cannot_forge_the_terminal(
@@ -82,21 +131,26 @@ def test_in_real_time_nothing_waits_for_who_does_not_listen(mode: str) -> None:
     server.publish()
     for code in (codes.PUSH, codes.RESET, codes.FALL, codes.SIGNAL):
         server.announce(code, "", "")
-    keys = {STATE.key("team", "r1"), TRUTH.key("team"), CLOCK.key("team"), EVENT.key("team")}
-    assert {key for key, _, _ in listener.packets} >= keys
-    assert {waits for key, waits, _ in listener.packets if key in keys} == {mode == "lockstep"}
+    keys = {LINK, BATCHES, TRUTH.key("team"), CLOCK.key("team"), EVENT.key("team")}
+    assert {key for key, _, _ in listener.packets} == keys
+    assert {waits for _, waits, _ in listener.packets} == {mode == "lockstep"}
 
 
-def test_who_watches_gets_the_states_of_some_ticks_and_holds_up_nobody() -> None:
+def test_who_looks_on_gets_each_state_and_command_in_batches_of_some_ticks() -> None:
     server, listener = served()
-    for _ in range(25):
+    for tick in range(25):
         server.publish()
+        listener.answer(command(tick))
+        assert server.receive("r1", tick, wait=False) == NEWER
         server.step({})
-    key = STATE.key("team", "r1")
-    states = [payload for sent, _, payload in listener.packets if sent == key]
-    postures = [p for p in listener.packets if p[0] == POSTURE.key("team", "r1")]
-    assert [payload for _, _, payload in postures] == [states[0], states[10], states[20]]
-    assert not any(waits for _, waits, _ in postures)
+    server.publish_batch()
+    batches = [list(gathered(payload)) for payload in listener.payloads(BATCHES)]
+    assert [len(batch) for batch in batches] == [1, 20, 20, 9]
+    told = [(item.topic, item.robot, item.message.tick) for batch in batches for item in batch]
+    assert told == [(topic, "r1", tick) for tick in range(25) for topic in (STATE, COMMAND)]
+    sent = [payload[HEADER.size :] for payload in listener.payloads(LINK)][1:]  # after a welcome
+    states = [item.message.row.tobytes() for batch in batches for item in batch][::2]
+    assert states == sent
 
 
 class BlindPlant(Plant):
@@ -121,17 +175,15 @@ class BlindPlant(Plant):
     ids=["stands", "falls", "stopped"],
 )
 def test_any_plant_is_served(down: str, last: int) -> None:
-    config, listener = configured(duration=2.0), Listener()
-    server = PlantServer(config, BlindPlant(down), cast("Bus", listener))
+    server, listener = served(BlindPlant(down), duration=2.0)
     end = None
     while end is None:
         server.publish()
         end = server.step({})
-    of_robot = {topic.key("team", "r1") for topic in (STATE, POSTURE)}
-    ours = of_robot | {EVENT.key("team"), CLOCK.key("team")}
+    ours = {LINK, BATCHES, EVENT.key("team"), CLOCK.key("team")}
     assert {key for key, _, _ in listener.packets} <= ours
-    clock = [decode(p, Clock).tick for key, _, p in listener.packets if key == CLOCK.key("team")]
-    assert clock == list(range(0, server.plant.tick, 10))
+    clock = [decode(payload, Clock).tick for payload in listener.payloads(CLOCK.key("team"))]
+    assert clock == list(range(0, server.plant.tick, 50))
     fallen, over = (codes.FALLEN, "fall of r1"), (codes.TIME_OVER, "end of world.duration")
     assert end == (fallen if down else over)
     assert server.plant.tick == last
@@ -139,18 +191,15 @@ def test_any_plant_is_served(down: str, last: int) -> None:
 
 @pytest.mark.parametrize("mode", ["lockstep", "realtime"])
 def test_no_command_of_a_tick_counts_that_came_before_the_robot_s_state_of_it(mode: str) -> None:
-    """A forged one that waits in the inbox would count before the agent's own."""
+    """A forged one would count before the agent's own."""
     server, listener = served(mode=mode)
-    key, zero = COMMAND.key("team", "r1"), np.zeros((4, 12))
-    own, forged = (encode(Command(1, 10**6, np.full(12, tau), *zero)) for tau in (1.0, 9.0))
     server.publish()
-    assert server.take(key, forged, oldest=0) == "", "the state of tick 1 is not out yet"
+    listener.answer(command(1, 9.0))
+    assert server.receive("r1", 0, wait=False) == REFUSED, "the state of tick 1 is not out yet"
     server.step({})
-    listener.arrived.append((key, forged))
     server.publish()
-    listener.arrived.append((key, own))
-    for packet in listener.drain():
-        server.take(*packet, oldest=0)
+    listener.answer(command(1, 1.0))
+    assert server.receive("r1", 0, wait=False) == NEWER
     assert server.commands.latest["r1"].tau[0] == 1.0
 
 

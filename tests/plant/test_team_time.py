@@ -9,16 +9,16 @@ from quadriga.plant.team_time import TeamTime
 from quadriga.shared import codes
 from quadriga.shared.codec import encode
 from quadriga.shared.config.load import load
-from quadriga.shared.messages import Clock, Event, State
-from quadriga.shared.topics import CLOCK, EVENT, STATE
+from quadriga.shared.messages import Clock, Event, Ticks
+from quadriga.shared.topics import CLOCK, EVENT, TICKS
 
 KEYS = {"team.robots": 3, "team.yokes": "none", "team.plant_per_robot": True}
 CONFIG = load(None, {**KEYS, "world.mode": "realtime"})
 EVERYBODY = {"plant_r1", "plant_r2", "plant_r3", "r1"}
 
 
-def state(tick: int) -> bytes:
-    return encode(State.from_row(tick, tick * 10**6, np.zeros(50)))
+def ticks(tick: int) -> bytes:
+    return encode(Ticks(tick, tick * 10**6, (), np.zeros((0, 53)), np.zeros((0, 63))))
 
 
 def clock(tick: int) -> bytes:
@@ -55,7 +55,7 @@ def test_a_fall_in_another_plant_is_heard() -> None:
 
 @pytest.mark.parametrize("robot", ["r1", "r2"])
 def test_a_plant_is_silent_whose_newest_message_is_too_old(robot: str) -> None:
-    heard = {STATE.key("team", "r2"): state, STATE.key("team", "r3"): state}
+    heard = {TICKS.key("team", f"plant_{name}"): ticks for name in ("r2", "r3")}
     heard = heard if robot == "r1" else {CLOCK.key("team"): clock}
     time = TeamTime(CONFIG, robot)
     for key, said in heard.items():

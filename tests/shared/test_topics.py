@@ -15,7 +15,6 @@ from quadriga.shared.topics import (
     AGENT_EVENT,
     CONFIGURED,
     INJECTED,
-    POSTURE,
     STATUS,
     TABLE,
     Topic,
@@ -64,11 +63,8 @@ def test_an_agent_takes_what_the_table_says(kind: str, estimator: str, mode: str
 
 
 def test_every_message_type_has_a_row_and_every_row_a_name() -> None:
-    """Events have three rows: only those of the plant, not of agents or launcher, may end a walk.
-
-    States have two, of which one is for who watches.
-    """
-    others = (AGENT_EVENT, INJECTED, POSTURE)
+    """Events have three rows: only those of the plant, not of agents or launcher, may end a walk."""
+    others = (AGENT_EVENT, INJECTED)
     types = [topic.type.__name__ for topic in TABLE if topic not in others]
     kinds = {*Message.__subclasses__(), *Flat.__subclasses__()} - {Flat}
     kinds = {kind for kind in kinds if kind.__module__ == Message.__module__}
@@ -77,7 +73,7 @@ def test_every_message_type_has_a_row_and_every_row_a_name() -> None:
 
 
 def test_the_keys_are_the_contract_with_other_tools() -> None:
-    of_robot = ["state", "command", "measurement", "plan", "status", "inputs", "event", "posture"]
+    of_robot = ["state", "command", "measurement", "plan", "status", "inputs", "event", "ticks"]
     of_people = ["reference", "estop", "stop", "reset", "resume", "fault", "injected"]
     of_team = [*of_people, "sim/truth", "sim/event", "clock"]
     keys = {f"team/r1/{name}" for name in of_robot} | {f"team/{name}" for name in of_team}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 
 import pytest
@@ -74,9 +74,9 @@ def congested() -> Iterator[tuple[Bus, Bus]]:
         recorder.kill()  # else nobody could leave
 
 
-def longest_way(operator: Bus, r1: Bus, *, droppable: bool = False, urgent: bool = False) -> float:
+def longest_way(r1: Bus, put: Callable[[bytes], None]) -> float:
     """Of ten messages, one after another, s."""
-    put, longest = (operator.publisher("team/operator/x", droppable=droppable, urgent=urgent), 0.0)
+    longest = 0.0
     for _ in range(10):
         begun = monotonic()
         put(b"")
@@ -86,7 +86,8 @@ def longest_way(operator: Bus, r1: Bus, *, droppable: bool = False, urgent: bool
 
 
 def test_what_waits_for_nobody_arrives_though_a_link_is_full(congested: tuple[Bus, Bus]) -> None:
-    assert longest_way(*congested, waits=False) < SOON
-    assert longest_way(*congested, waits=False) < SOON
+    (operator, r1), key = congested, "team/operator/x"
+    assert longest_way(r1, operator.urgent_publisher(key)) < SOON
+    assert longest_way(r1, operator.publisher(key, waits=False)) < SOON
     # What waits for everybody is held up: the link is full indeed.
-    assert longest_way(*congested) > SOON
+    assert longest_way(r1, operator.publisher(key)) > SOON
