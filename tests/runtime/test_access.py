@@ -15,16 +15,20 @@ from quadriga.doctor.examine import examine
 from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.errors import BusError, ConfigError
 from quadriga.shared.security.certificates import TlsFiles, tls_files
+from tests.listening import await_true
 from tests.runtime.fortress import LONG_AGO, NOW, WAIT, Fortress, make_fortress, serving, stranger
 
+COMMAND, STATE = "team/@link/r1/command", "team/@link/r1/state"
 LAST = b"last"  # what comes in last over a link: the rest has come in before, or was refused
 FOREIGN = {  # by whose certificate was stolen: keys that are not its owner's
     "r1": ("team/reference", "team/r2/plan", "team/of/strangers", "other/r1/command"),
-    "r2": ("team/r1/command", "team/r1/state", "team/sim/event"),
-    "sim": ("team/r1/command",),
-    "operator": ("team/r1/command",),
-    "recorder": ("team/estop",),
+    "r2": (COMMAND, STATE, "team/r1/command", "team/r1/state", "team/r1/ticks", "team/sim/event"),
+    "sim": (COMMAND, "team/r1/command"),
+    "operator": (COMMAND, STATE, "team/r1/command"),
+    "recorder": (COMMAND, STATE, "team/estop"),
 }
+
+EVERYTHING = ("**", "team/**", "team/*/ticks", "team/@link/**", "team/@link/*/state")
 
 
 @pytest.fixture(scope="module")
@@ -59,23 +63,32 @@ def heard(fortress: Fortress, recorder: Bus, session: zenoh.Session | None = Non
 
 @pytest.mark.parametrize("thief", FOREIGN)
 def test_foreign_keys_are_refused(fortress: Fortress, recorder: Bus, thief: str) -> None:
-    with stranger(fortress, fortress.files(thief)) as session:
+    with (
+        fortress.bus("sim") as sim,
+        fortress.bus("r1") as agent,
+        stranger(fortress, fortress.files(thief)) as session,
+    ):
+        linked = [sim.collect(COMMAND), agent.collect(STATE)]
+        own = [agent.publisher(COMMAND), sim.publisher(STATE)]
+        for put, take in zip(own, linked, strict=True):
+            await_true(lambda put=put, take=take: put(LAST) or take())
         for key in 20 * FOREIGN[thief]:
             session.put(key, bytes(50), congestion_control=zenoh.CongestionControl.BLOCK)
         assert heard(fortress, recorder, session) == set()
+        for _ in session.get("team/*/received", target=zenoh.QueryTarget.ALL, timeout=WAIT):
+            pass
+        assert {payload for take in linked for _, _, payload in take()} <= {LAST}
 
 
 def test_who_is_let_in_hears_what_is_its_own_alone(fortress: Fortress, recorder: Bus) -> None:
     with fortress.bus("sim") as sim, stranger(fortress, fortress.files("r2")) as session:
-        stolen = [session.declare_subscriber(key) for key in ("**", "team/**", "team/*/state")]
-        own = session.declare_subscriber("team/r2/state")
-        states = [sim.publisher(f"team/{name}/state") for name in ("r1", "r2")]
-        while "team/r2/state" not in heard(fortress, recorder, session):
-            for put in states:
-                put(bytes(50))
-        assert str(own.recv().key_expr) == "team/r2/state"
+        stolen = [session.declare_subscriber(key) for key in EVERYTHING]
+        own = session.declare_subscriber("team/@link/r2/state")
+        states = [sim.publisher(f"team/@link/{name}/state") for name in ("r1", "r2")]
+        await_true(lambda: [put(bytes(50)) for put in states] and own.try_recv())
+        assert heard(fortress, recorder, session) == set(), "no state goes to who hears all else"
         samples = [sample for each in stolen for sample in iter(each.try_recv, None)]
-        assert {str(sample.key_expr) for sample in samples} <= {"team/r2/state"}
+        assert {str(sample.key_expr) for sample in samples} <= {"team/@link/r2/state"}
 
 
 def test_forged_presence_is_seen_by_nobody(fortress: Fortress, recorder: Bus) -> None:
