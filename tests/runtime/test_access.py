@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,7 @@ import zenoh
 
 from quadriga.certs.folder import CertificateFolder
 from quadriga.doctor.examine import examine
-from quadriga.shared.bus.session import HERE, Bus
+from quadriga.shared.bus.session import HERE, Arrival, Bus
 from quadriga.shared.errors import BusError, ConfigError
 from quadriga.shared.security.certificates import TlsFiles, tls_files
 from tests.listening import await_true
@@ -61,6 +62,12 @@ def heard(fortress: Fortress, recorder: Bus, session: zenoh.Session | None = Non
     return keys
 
 
+def bring(put: Callable[[bytes], None], take: Callable[[], list[Arrival]]) -> list[Arrival]:
+    """Send a last word; what has come until now."""
+    put(LAST)
+    return take()
+
+
 @pytest.mark.parametrize("thief", FOREIGN)
 def test_foreign_keys_are_refused(fortress: Fortress, recorder: Bus, thief: str) -> None:
     with (
@@ -71,7 +78,7 @@ def test_foreign_keys_are_refused(fortress: Fortress, recorder: Bus, thief: str)
         linked = [sim.collect(COMMAND), agent.collect(STATE)]
         own = [agent.publisher(COMMAND), sim.publisher(STATE)]
         for put, take in zip(own, linked, strict=True):
-            await_true(lambda put=put, take=take: put(LAST) or take())
+            await_true(partial(bring, put, take))
         for key in 20 * FOREIGN[thief]:
             session.put(key, bytes(50), congestion_control=zenoh.CongestionControl.BLOCK)
         assert heard(fortress, recorder, session) == set()
