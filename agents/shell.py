@@ -17,10 +17,10 @@ from quadriga.agents.planning.interface import NOTHING, Expected
 from quadriga.agents.step_io import Inputs, Outputs
 from quadriga.agents.telemetry import Telemetry
 from quadriga.shared.bus.discovery import ProcessInfo, join, log
-from quadriga.shared.bus.liveness import Loss, find_lost_link, loss_error
-from quadriga.shared.bus.session import HERE, POLL, READY, Bus
+from quadriga.shared.bus.liveness import LAST_PACKETS, Loss, find_lost_link, loss_error
+from quadriga.shared.bus.session import HERE, POLL, READY, Bus, pause
 from quadriga.shared.codec import encode
-from quadriga.shared.codes import LEAD_GONE
+from quadriga.shared.codes import LEAD_GONE, LINK_LOST
 from quadriga.shared.config.sections import Config
 from quadriga.shared.config.timing import PEER_TIMEOUT
 from quadriga.shared.link.agent_end import AgentEnd
@@ -130,7 +130,7 @@ class AgentShell:
         """Answer every state until the walk is over.
 
         Raises:
-            ProcessError: the plant has vanished.
+            ProcessError: the plant, or its link to the router and this agent's, has vanished.
         """
         inbox, link, walks = self._inbox, self._link, False
         while not (stopped() or link.ended):
@@ -155,6 +155,20 @@ class AgentShell:
             state = inbox.pop_state()
             if state is not None:
                 self._memory = self._step(self._memory_now(), state)
+        if link.ended == LINK_LOST:
+            self._check_link()
+
+    def _check_link(self) -> None:
+        """Complain if this agent's link to the router is gone, too, or will be in a moment.
+
+        Raises:
+            ProcessError: it is.
+        """
+        deadline = monotonic() + LAST_PACKETS
+        while (loss := find_lost_link(self._bus, self._config)) is None and monotonic() < deadline:
+            pause()
+        if loss is not None:
+            raise loss_error(loss, max(self._memory_now().tick, 0))
 
     def _memory_now(self) -> Any:
         """What the agent remembers: behind the plain ticks since its last step, if there are."""

@@ -53,6 +53,8 @@ def run_lockstep(server: PlantServer, stopped: Callable[[], bool]) -> End:
         commands = _await_commands(server, stopped)
         if stopped():
             break  # commands may be missing that nobody has lost
+        if server.plant.tick % SAMPLE_MS == 0:
+            server.check_link()
         end = server.time.end or server.step(commands)
         if end is not None:
             return end
