@@ -249,8 +249,12 @@ class Inbox:
             if self._newest.get(source, _NEVER) < limit
         )
 
-    def pop_inputs(self, state: State, expected: Expected) -> Inputs:
-        """All that is due at the step of `state`, sorted by robot, then tick; it is removed."""
+    def pop_inputs(self, state: State, expected: Expected, *, answered: bool = False) -> Inputs:
+        """All that is due at the step of `state`, sorted by robot, then tick; it is removed.
+
+        Of a state that is `answered` already what people ask for is left for the next step: it
+        would change the command.
+        """
         due_later = not self._held or (self._lockstep and expected is NOTHING)
         if due_later and not self._requests:
             return Inputs(state)
@@ -264,7 +268,8 @@ class Inbox:
             if later:
                 self._held[source] = later
             due[topic] += ((sender, message) for message in held[: len(held) - len(later)])
-        requests, self._requests = self._requests, {}
+        requests = {} if answered else self._requests
+        self._requests = self._requests if answered else {}
         return Inputs(
             state,
             measurements=tuple(due[MEASUREMENT.name]),

@@ -17,8 +17,8 @@ from quadriga.agents.planning.interface import NOTHING, Expected
 from quadriga.agents.step_io import Inputs, Outputs
 from quadriga.agents.telemetry import Telemetry
 from quadriga.shared.bus.discovery import ProcessInfo, join, log
-from quadriga.shared.bus.liveness import LAST_PACKETS, Loss, find_lost_link, loss_error
-from quadriga.shared.bus.session import HERE, POLL, READY, Bus, pause
+from quadriga.shared.bus.liveness import Loss, find_lost_link, loss_error
+from quadriga.shared.bus.session import HERE, POLL, READY, Bus
 from quadriga.shared.codec import encode
 from quadriga.shared.codes import LEAD_GONE, LINK_LOST
 from quadriga.shared.config.sections import Config
@@ -27,7 +27,7 @@ from quadriga.shared.link.agent_end import AgentEnd
 from quadriga.shared.link.ticks import TickBatch
 from quadriga.shared.messages import Command, Message, State
 from quadriga.shared.robots.conventions import Array
-from quadriga.shared.runtime.clock import monotonic, monotonic_ns
+from quadriga.shared.runtime.clock import log_ns, monotonic, monotonic_ns
 from quadriga.shared.runtime.scheduling import at_work
 from quadriga.shared.runtime.signals import interruptible
 from quadriga.shared.topics import (
@@ -124,13 +124,13 @@ class AgentShell:
         self._plain = PlainTicks(agent) if isinstance(agent, Agent) else None
         self._memory = agent.initial()
         # Tick, state and command of the last ones, for the recording if the plant is killed.
-        self._lately: deque[tuple[float, int, bytes, bytes]] = deque(maxlen=2 * TICKS_MS)
+        self._lately: deque[tuple[int, int, bytes, bytes]] = deque(maxlen=2 * TICKS_MS)
 
     def walk(self, stopped: Callable[[], bool]) -> None:
         """Answer every state until the walk is over.
 
         Raises:
-            ProcessError: the plant, or its link to the router and this agent's, has vanished.
+            ProcessError: the plant, or the link to the router, has vanished.
         """
         inbox, link, walks = self._inbox, self._link, False
         while not (stopped() or link.ended):
@@ -156,19 +156,7 @@ class AgentShell:
             if state is not None:
                 self._memory = self._step(self._memory_now(), state)
         if link.ended == LINK_LOST:
-            self._check_link()
-
-    def _check_link(self) -> None:
-        """Complain if this agent's link to the router is gone, too, or will be in a moment.
-
-        Raises:
-            ProcessError: it is.
-        """
-        deadline = monotonic() + LAST_PACKETS
-        while (loss := find_lost_link(self._bus, self._config)) is None and monotonic() < deadline:
-            pause()
-        if loss is not None:
-            raise loss_error(loss, max(self._memory_now().tick, 0))
+            self._end_without_plant()
 
     def _memory_now(self) -> Any:
         """What the agent remembers: behind the plain ticks since its last step, if there are."""
@@ -223,7 +211,7 @@ class AgentShell:
         """Send the command of a tick, whose row is filled."""
         command = self._link.command
         self._link.send(command.stamp(tick, 1_000_000 * tick))
-        self._lately.append((monotonic(), tick, state.tobytes(), command.row.tobytes()))
+        self._lately.append((log_ns(), tick, state.tobytes(), command.row.tobytes()))
 
     def _step(
         self, memory: Any, state: State, acted: Acted | None = None, answered_ns: int = 0
@@ -239,7 +227,7 @@ class AgentShell:
         expected = self._agent.expected(tick)
         if self._lockstep and expected is not NOTHING:
             self._await_messages(tick, expected)
-        inputs = self._inbox.pop_inputs(state, expected)
+        inputs = self._inbox.pop_inputs(state, expected, answered=acted is not None)
         if acted is not None and self._plain is not None:
             after, outputs = self._plain.agent.finish_step(memory, inputs, acted)
         else:
@@ -267,14 +255,17 @@ class AgentShell:
         Raises:
             ProcessError: always.
         """
-        robot, tick = self._agent.robot, 0
+        config, robot, tick = self._config, self._agent.robot, 0
         batch = TickBatch((robot,), len(self._lately) + 1)
         for at, tick, state, command in self._lately:
             batch.add_state(robot, tick, np.frombuffer(state), at)
             batch.add_command(robot, tick, np.frombuffer(command), at)
         self._publish(TICKS, batch.take(tick))
+        loss = find_lost_link(self._bus, config)
+        if loss is None and self._link.ended:
+            loss = Loss(LINK_LOST, f"link of {self._link.plant} to the router")
         name = f"process {self._link.plant} of team {self._bus.team!r}, seen by {robot}"
-        raise loss_error(find_lost_link(self._bus, self._config) or Loss(LEAD_GONE, name), tick)
+        raise loss_error(loss or Loss(LEAD_GONE, name), tick)
 
     def _await_messages(self, tick: int, expected: Expected) -> None:
         """Wait for the messages that a step expects.

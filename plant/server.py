@@ -36,7 +36,7 @@ from quadriga.shared.messages import (
     format_event,
 )
 from quadriga.shared.robots.conventions import robot_names
-from quadriga.shared.runtime.clock import monotonic
+from quadriga.shared.runtime.clock import log_ns
 from quadriga.shared.topics import CLOCK, EVENT, STATUS, TICKS, TICKS_MS, TRUTH
 
 FALL_LINGER_MS: Final = 1000  # world time that is still shown after the first simulated fall
@@ -76,7 +76,7 @@ class PlantServer:
         # What is said may come twice; a release may end no stop that was pressed meanwhile.
         self._heard: dict[type[Message], Message] = {}
         self._batch = TickBatch(plant.names, TICKS_MS)
-        self._taken = list[tuple[str, Command, float]]()  # and when, not in the batch yet
+        self._taken = list[tuple[str, Command, int]]()  # and when, not in the batch yet
         self._put_ticks = bus.publisher(TICKS.key(team, plant_name(robot)), waits=not realtime)
         self._put_truth = bus.publisher(TRUTH.key(team), waits=not realtime)
         self._put_clock = bus.publisher(CLOCK.key(team), waits=not realtime)
@@ -102,7 +102,7 @@ class PlantServer:
         states = plant.states()
         for name, state in states.items():
             self.link.send(name, state)
-        self._published, now = tick, monotonic()
+        self._published, now = tick, log_ns()
         self._gather(states, now)
         for packet in self.bus.drain():
             self.time.take(*packet, tick)
@@ -116,7 +116,7 @@ class PlantServer:
             self.publish_batch()
         plant.settle()
 
-    def _gather(self, states: Mapping[str, State], now: float) -> None:
+    def _gather(self, states: Mapping[str, State], now: int) -> None:
         """Put what was taken in, and states that were sent now, into the batch."""
         for name, command, at in self._taken:
             self._batch.add_command(name, command.tick, command.row, at)
@@ -126,7 +126,7 @@ class PlantServer:
 
     def publish_batch(self) -> None:
         """Tell who records or looks on what has gone over the link since the last time."""
-        self._gather({}, 0.0)
+        self._gather({}, 0)
         batch = self._batch.take(self.plant.tick)
         if batch is not None:
             self._put_ticks(encode(batch))
@@ -152,7 +152,7 @@ class PlantServer:
         command = Command.from_row(got.tick, got.stamp_ns, got.command.copy())
         if not box.take(robot, command, self._published, oldest):
             return REFUSED
-        self._taken.append((robot, command, monotonic()))
+        self._taken.append((robot, command, log_ns()))
         return NEWER
 
     def check_link(self) -> None:

@@ -151,30 +151,32 @@ class Command(Flat):
     kd: Array = array(12, entries=JOINTS, unit="N·m·s/rad", frame="joint")
 
 
-_GATHERED: Final = ("robot", "tick", "age")  # in front of each row of `Ticks`
+_GATHERED: Final = ("robot", "tick", "after")  # in front of each row of `Ticks`
 
 
 @record
 class Ticks(Message):
     """States and commands of some ticks, as they went over a plant link, for who looks on.
 
-    In front of each row: the robot's place in `robots`, the tick, and how long ago it was sent, or
-    taken in, when this was sent.
+    In front of each row: the robot's place in `robots`, the tick, and how long after `begun_ns` it
+    was sent, or taken in.
     """
+
+    begun_ns: int = plain(int, "when the first of them was, by the sender's system clock [ns]")
 
     robots: tuple[str, ...] = plain(list, "names of the robots")
     states: Array = array(
         "s",
         len(_GATHERED) + max(cut.stop for cut in State.CUTS.values()),
         entries=(*_GATHERED, *State.entries()),
-        unit="1, ms, s, then as in State",
+        unit="1, ms, ns, then as in State",
         finite=False,
     )
     commands: Array = array(
         "c",
         len(_GATHERED) + max(cut.stop for cut in Command.CUTS.values()),
         entries=(*_GATHERED, *Command.entries()),
-        unit="1, ms, s, then as in Command",
+        unit="1, ms, ns, then as in Command",
         finite=False,
     )
 

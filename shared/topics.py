@@ -55,6 +55,10 @@ class Topic:
         """The Zenoh key of this topic; `robot` may be `*`."""
         return f"{team}/{robot}/{self.name}" if self.per_robot else f"{team}/{self.name}"
 
+    def link_key(self, team: str, robot: str) -> str:
+        """Where packets of a plant link go over the bus; no `**` of who looks on takes it in."""
+        return f"{team}/@link/{robot}/{self.name}"
+
 
 STATE: Final = Topic(
     "state", msg.State, (SIM,), (AGENT,), per_robot=True, period_ms=1, max_age_ms=20

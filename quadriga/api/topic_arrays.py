@@ -56,7 +56,8 @@ class TopicArrays:
     Attributes:
         key: without the team's name, such as `r1/state`.
         tick: world time of each message, shape (T,), ms.
-        log_time_ns: when the recorder heard it, by the wall clock, shape (T,), ns since 1970.
+        log_time_ns: when the recorder heard it, or a plant sent or took in a state or command, by
+            the wall clock, shape (T,), ns since 1970.
         fields: what the messages hold, by name, with units and frames.
         invalid: how many more messages there were that are none of this topic; they are left out.
         arrays: of each field, see `__getitem__`.

@@ -66,7 +66,8 @@ def run(
 
     The recorder is a member that the team waits for, unless the team walks already or has one:
     then it records beside it from now on, nobody waits for it, and it reports what it missed.
-    A message's log time is when it was taken from the inbox, some ms after its reception.
+    A message's log time is when it was taken from the inbox, some ms after its reception; of states
+    and commands when the plant sent them, or took them in.
 
     Args:
         config: the team's configuration, stored with the recording.

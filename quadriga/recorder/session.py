@@ -141,7 +141,7 @@ class Session:
         for begin in range(0, len(packets), _SLICE):
             for key, payload in packets[begin : begin + _SLICE]:
                 if key.endswith(_TICKS):
-                    self._write_ticks(key, payload, now)
+                    self._write_ticks(key, payload)
                     continue
                 if every or recorded(key):
                     write(key, payload, now)
@@ -153,18 +153,18 @@ class Session:
         self._tend()
         return bool(packets)
 
-    def _write_ticks(self, key: str, payload: bytes, now: int) -> None:
+    def _write_ticks(self, key: str, payload: bytes) -> None:
         """Write each state and command of a batch under its own key.
 
         What an agent has gathered counts only where its plant was killed before it told the same.
         """
         team, robot = self._bus.team, find_topic(key)[1]
         told = self._parts.ticks if robot in self._robots else {}
-        items = ((item.key(team), item.message, item.age) for item in gathered(payload))
+        items = ((item.key(team), item.message, item.log_ns) for item in gathered(payload))
         self._parts.write_all(
             [
-                (of, message, now - round(1e9 * age))
-                for of, message, age in items
+                (of, message, log_time)
+                for of, message, log_time in items
                 if self._keys(of) and message.tick > told.get(of, -1)
             ]
         )

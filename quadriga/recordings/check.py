@@ -74,14 +74,14 @@ def _decode_valid(
 ) -> Iterator[CheckedMessage]:
     """The valid messages; what breaks a rule goes to the findings `schema` and `times`."""
     rows: dict[str, tuple[Topic | None, str]] = {}
-    last = foreign = 0
+    foreign, newest = 0, dict[str, int]()  # log time by key: each sender has a clock of its own
     for key, tick, log_time, payload in entries:
         times.looked += 1
-        if log_time < last:
+        if log_time < (last := newest.get(key, 0)):
             times.add_objection(
                 tick, key, f"{(last - log_time) / 1e6:.3f} ms before", "a later log time"
             )
-        last = log_time
+        newest[key] = log_time
         if key not in rows:
             rows[key] = find_topic(key)
         topic, robot = rows[key]

@@ -84,8 +84,8 @@ def entries_from_bus(
                 if key.endswith(f"/{TICKS.name}"):
                     for item in gathered(payload):
                         if _matches(patterns, of := item.key(team)):
-                            at = now - round(1e9 * item.age)
-                            yield ChunkEntry(of, item.message.tick, at, encode(item.message))
+                            tick, sent = item.message.tick, encode(item.message)
+                            yield ChunkEntry(of, tick, item.log_ns, sent)
 
 
 def _matches(patterns: Sequence[KeyPattern], key: str) -> bool:

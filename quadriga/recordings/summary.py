@@ -203,7 +203,6 @@ def _deadlines(traces: Traces) -> dict[str, Any]:
             "late_share": late / ticks if ticks else None,
             "held": sim_status.counters.get(f"{robot}.held", 0),
             "command_age_ms": _spread(sim_status, f"{robot}.command"),
-            "deadlines_missed": own[-1].counters.get("deadlines_missed") if own else None,
             "jitter_ms": _spread(own[-1], "jitter") if own else {},
         }
     return {"realtime": by_member}

@@ -67,9 +67,8 @@ class TeamListener:
                 head = envelope(payload)
                 self._fold.add(key, payload, -1 if head is None else head[0], at_ns)
                 for item in gathered(payload) if key.endswith(f"/{TICKS.name}") else ():
-                    sent_ns = at_ns - round(1e9 * item.age)
                     of, tick = item.key(self._bus.team), item.message.tick
-                    self._fold.add(of, encode(item.message), tick, sent_ns)
+                    self._fold.add(of, encode(item.message), tick, at_ns)
 
     def look(self) -> TeamStatus:
         """How the team is now, by what was heard since the last look."""

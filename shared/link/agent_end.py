@@ -17,7 +17,6 @@ from quadriga.shared.link.connections import (
     BusConnection,
     Connection,
     connect,
-    link_key,
     local_address,
 )
 from quadriga.shared.link.packets import (
@@ -68,10 +67,10 @@ class AgentEnd:
         if config.plant.link != "local":
             team = config.team.name
             put = bus.publisher(
-                link_key(team, robot, topics.COMMAND), waits=config.world.mode == "lockstep"
+                topics.COMMAND.link_key(team, robot), waits=config.world.mode == "lockstep"
             )
             self._over_bus = BusConnection(put, lambda: self.plant not in bus.members_at(HERE))
-            bus.hear(link_key(team, robot, topics.STATE), self._over_bus.arrived.put)
+            bus.hear(topics.STATE.link_key(team, robot), self._over_bus.arrived.put)
 
     def open(self, stopped: Callable[[], bool]) -> bool:
         """Connect to the plant, which is on the bus; False if `stopped()` came first.

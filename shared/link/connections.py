@@ -19,7 +19,6 @@ from quadriga.shared.bus.ring_buffer import Mailbox
 from quadriga.shared.bus.session import POLL
 from quadriga.shared.config.sections import Config
 from quadriga.shared.runtime.places import make_runtime_dir
-from quadriga.shared.topics import Topic
 
 CLOSED: Final = 0  # in place of a number of bytes: the other end is gone
 NOTHING: Final = -1  # nothing has come
@@ -111,11 +110,6 @@ class BusConnection:
 
     def close(self) -> None:
         return
-
-
-def link_key(team: str, robot: str, topic: Topic) -> str:
-    """Where packets of a robot go over the bus: a key that no `**` of who looks on takes in."""
-    return f"{team}/@link/{robot}/{topic.name}"
 
 
 def local_address(config: Config, plant: str) -> Path | None:

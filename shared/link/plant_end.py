@@ -19,7 +19,6 @@ from quadriga.shared.link.connections import (
     BusConnection,
     Connection,
     LocalConnection,
-    link_key,
     listen,
     local_address,
     own_user,
@@ -80,11 +79,11 @@ class PlantEnd:
         kind, team = self._config.plant.link, self._config.team.name
         if kind != "local":
             for name in self._places:
-                key, waits = link_key(team, name, topics.STATE), self._lockstep
+                key, waits = topics.STATE.link_key(team, name), self._lockstep
                 put = self._bus.publisher(key, waits=waits)
                 way = BusConnection(put, partial(self._is_gone, name))
                 self._over_bus[name] = way
-                self._bus.hear(link_key(team, name, topics.COMMAND), partial(self._take, name, way))
+                self._bus.hear(topics.COMMAND.link_key(team, name), partial(self._take, name, way))
         address = local_address(self._config, self._bus.name)
         if kind == "bus" or (address is None and kind != "local"):
             return
@@ -167,6 +166,6 @@ class PlantEnd:
             if fault:
                 way.send(text_packet(REFUSED, text=fault))
                 return False
-            self.connected[name] = way  # first: who is welcome is there
+            self.connected[name] = way
             way.send(text_packet(WELCOME, self._places[name]))
         return True

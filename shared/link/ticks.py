@@ -2,37 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from quadriga.shared.codec import decode
+from quadriga.shared.codec import MAX_INTEGER, decode
 from quadriga.shared.errors import MessageError
 from quadriga.shared.link.packets import COMMAND_SIZE, STATE_SIZE
 from quadriga.shared.messages import Command, Flat, State, Ticks
 from quadriga.shared.robots.conventions import Array
-from quadriga.shared.runtime.clock import monotonic
 from quadriga.shared.topics import COMMAND, STATE, Topic
 
 _BEFORE: Final = 3  # numbers in front of a row: the robot, its tick, and when
 _PER_TICK: Final = 4  # rows of a robot in a tick that there is room for; more are sent at once
 
 
-class Gathered(NamedTuple):
+class LinkMessage(NamedTuple):
     """A state or a command out of a batch.
 
     Attributes:
         topic: `STATE` or `COMMAND`.
         robot: its robot's name.
         message: itself.
-        age: how long before the batch was sent it was, s.
+        log_ns: when it was sent, or taken in, ns since 1970.
     """
 
     topic: Topic
     robot: str
     message: Flat
-    age: float
+    log_ns: int
 
     def key(self, team: str) -> str:
         """The key under which it is known."""
@@ -45,22 +44,19 @@ class TickBatch:
     Args:
         robots: whose they are.
         ticks: for how many there is room.
-        now: a steady clock, s.
     """
 
-    def __init__(
-        self, robots: Sequence[str], ticks: int, now: Callable[[], float] = monotonic
-    ) -> None:
-        self._robots, self._now = tuple(robots), now
+    def __init__(self, robots: Sequence[str], ticks: int) -> None:
+        self._robots = tuple(robots)
         self._place = {name: place for place, name in enumerate(robots)}
         room = _PER_TICK * len(robots) * ticks
-        self._states, self._commands = _Rows(room, STATE_SIZE), _Rows(room, COMMAND_SIZE)
+        self._states, self._commands = _RowBuffer(room, STATE_SIZE), _RowBuffer(room, COMMAND_SIZE)
 
-    def add_state(self, robot: str, tick: int, row: Array, at: float) -> None:
-        """Gather a state that was sent at a time of `now`."""
+    def add_state(self, robot: str, tick: int, row: Array, at: int) -> None:
+        """Gather a state that was sent at a time of `clock.log_ns`."""
         self._states.add((self._place[robot], tick, at), row)
 
-    def add_command(self, robot: str, tick: int, row: Array, at: float) -> None:
+    def add_command(self, robot: str, tick: int, row: Array, at: int) -> None:
         """Gather a command that was taken in then."""
         self._commands.add((self._place[robot], tick, at), row)
 
@@ -71,42 +67,46 @@ class TickBatch:
         return self._states.room < n or self._commands.room < _PER_TICK * n
 
     def take(self, tick: int) -> Ticks | None:
-        """All that was gathered, as a message that is sent now; None of nothing."""
-        now = self._now()
-        states, commands = self._states.take(now), self._commands.take(now)
+        """All that was gathered, as a message; None of nothing."""
+        begun = min(self._states.begun, self._commands.begun)
+        states, commands = self._states.take(begun), self._commands.take(begun)
         if not (len(states) or len(commands)):
             return None
-        return Ticks(tick, tick * 1_000_000, self._robots, states, commands)
+        return Ticks(tick, tick * 1_000_000, begun, self._robots, states, commands)
 
 
-class _Rows:
+class _RowBuffer:
     """Rows of numbers, what stands before each apart until all are taken."""
 
     def __init__(self, most: int, size: int) -> None:
         self._rows = np.empty((most, _BEFORE + size))
-        self._heads = list[tuple[int, int, float]]()
+        self._heads = list[tuple[int, int, int]]()
 
     @property
     def room(self) -> int:
         return len(self._rows) - len(self._heads)
 
-    def add(self, head: tuple[int, int, float], row: Array) -> None:
+    @property
+    def begun(self) -> int:
+        """When the first was; no time of `clock.log_ns` is as late as that of none."""
+        return self._heads[0][2] if self._heads else MAX_INTEGER - 1
+
+    def add(self, head: tuple[int, int, int], row: Array) -> None:
         if not self.room:  # of an agent that answers much at once
             self._rows = np.concatenate([self._rows, np.empty_like(self._rows)])
         self._rows[len(self._heads), _BEFORE:] = row
         self._heads.append(head)
 
-    def take(self, now: float) -> Array:
+    def take(self, begun: int) -> Array:
         """Those that were added, of which nothing is left: the next ones take their place."""
         rows = self._rows[: len(self._heads)]
         if self._heads:
-            rows[:, :_BEFORE] = self._heads
-            rows[:, 2] = now - rows[:, 2]
+            rows[:, :_BEFORE] = [(place, tick, at - begun) for place, tick, at in self._heads]
             self._heads.clear()
         return rows
 
 
-def gathered(payload: bytes) -> Iterator[Gathered]:
+def gathered(payload: bytes) -> Iterator[LinkMessage]:
     """The states and commands of a batch, oldest first; nothing of bytes that are none."""
     try:
         ticks = decode(payload, Ticks)
@@ -118,8 +118,9 @@ def gathered(payload: bytes) -> Iterator[Gathered]:
         for topic, kind, rows in parts
         for robot, row in zip(rows[:, 0].astype(int).tolist(), rows, strict=True)
     ]
-    for age, topic, kind, robot, row in sorted(found, key=lambda item: -item[0]):
+    for after, topic, kind, robot, row in sorted(found, key=lambda item: item[0]):
         if 0 <= robot < len(ticks.robots):
             tick = int(row[1])
             message = kind.from_row(tick, 1_000_000 * tick, row[_BEFORE:])
-            yield Gathered(topic, ticks.robots[robot], message, float(age))
+            log_ns = ticks.begun_ns + int(after)
+            yield LinkMessage(topic, ticks.robots[robot], message, log_ns)

@@ -19,7 +19,6 @@ from quadriga.shared import members
 from quadriga.shared.about import about_key
 from quadriga.shared.codec import MAX_BYTES
 from quadriga.shared.config.sections import Config
-from quadriga.shared.link.connections import link_key
 from quadriga.shared.members import AGENT, DOCTOR, LEADS, OBSERVER, RECORDER, ROUTER, Member, Role
 from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.topics import (
@@ -92,7 +91,7 @@ def team_rights(config: Config) -> dict[str, Rights]:
 
 def _key(topic: Topic, team: str, robot: str) -> str:
     """The key of a topic; states and commands have those of the plant link."""
-    return link_key(team, robot, topic) if topic in (STATE, COMMAND) else topic.key(team, robot)
+    return (topic.link_key if topic in (STATE, COMMAND) else topic.key)(team, robot)
 
 
 def _names(who: Member, topic: Topic, robots: Sequence[str]) -> Sequence[str]:

@@ -61,9 +61,11 @@ class Motors:
         # Of each joint the limits of a cool motor, `MotorCurves`, and that of a hot one, N·m.
         hot = np.tile(robot.continuous_torque, N_LEGS)
         self._limits = np.array([*motor_curves(robot, torque_speed=config.torque_speed), hot])
-        self._follow = lag if config.bandwidth > 0.0 else 1.0
-        self._friction = config.friction, config.viscous_friction
-        self._heating = _TICK / config.heat_time if config.heat_time > 0.0 else 0.0
+        # Share of a torque error that is made up for in a tick; friction, dry, N·m, and by rate,
+        # N·m·s/rad; share of a tick in the filter of the temperature, 0: it stays.
+        follow = lag if config.bandwidth > 0.0 else 1.0
+        heating = _TICK / config.heat_time if config.heat_time > 0.0 else 0.0
+        self._shares = follow, config.friction, config.viscous_friction, heating
         on_the_way = [np.tile(idle.row, (robots, 1)) for _ in range(config.delay_ms)]
         self._on_the_way: deque[Array] = deque(on_the_way)
 
@@ -81,8 +83,7 @@ class Motors:
             v: velocities, its joints behind the trunk's six, (n, 18).
             strength: the share of its limited torque that each motor gives, (n, 12).
         """
-        limits, friction, memory = self._limits, self._friction, self._memory
-        _drive(arrived, q, v, strength, limits, self._follow, friction, self._heating, memory)
+        _drive(arrived, q, v, strength, self._limits, self._shares, self._memory)
 
 
 @compiled
@@ -92,19 +93,12 @@ def _drive(
     v: Array,
     strength: Array,
     limits: Array,
-    follow: float,
-    friction: tuple[float, float],
-    heating: float,
+    shares: tuple[float, float, float, float],
     memory: Array,
 ) -> None:
-    """Advance torques, what of them is left for the joints, heat and what sound motors give.
-
-    `limits` are those of `MotorCurves` and of a hot motor, (5, 12); `follow` is the share of a
-    torque error that is made up for in a tick; `friction` is dry, N·m, and by rate, N·m·s/rad;
-    `heating` is the share of a tick in the filter of the temperature, 0: it stays.
-    """
+    """Advance torques, what of them is left for the joints, heat and what sound motors give."""
     curves, hot = MotorCurves(limits[0], limits[1], limits[2], limits[3]), limits[4]
-    dry, viscous = friction
+    follow, dry, viscous, heating = shares
     torque, left, heat, sound = memory[0], memory[1], memory[2], memory[3]
     for i in range(len(commands)):
         row, angles, rates = commands[i], q[i, JOINT_POSITIONS], v[i, JOINT_RATES]

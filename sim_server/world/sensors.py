@@ -160,7 +160,7 @@ class Sensors:
             self._draw()
         rows, now = np.empty((len(q), _ROW)), self._next
         yaw = self._yaw_rate * (1e-3 * tick)
-        _observe(q, v, tau, sensed, self._noise, self._turns, now, yaw, rows)
+        _observe(q, v, tau, sensed, self._noise[now], self._turns[now], yaw, rows)
         _convert_foot_forces(
             self._kind, self._feet.scale, self._unloaded, self._faults, now, self._last, rows
         )
@@ -190,13 +190,12 @@ def _observe(
     sensed: Array,
     noise: Array,
     turns: Array,
-    now: int,
     yaw: Array,
     rows: Array,
 ) -> None:
     """Fill the rows of all robots' states; `yaw`, (n,), is the drift of their headings, rad."""
     for i in range(len(rows)):
-        row, extra = rows[i], noise[now, i]
+        row, extra = rows[i], noise[i]
         row[_Q] = extra[_Q] + q[i, JOINT_POSITIONS]
         row[_V] = extra[_V] + v[i, JOINT_RATES]
         row[_TAU] = extra[_TAU] + tau[i]
@@ -204,7 +203,7 @@ def _observe(
         row[_STATE_ACCEL] = extra[_ACCEL] + sensed[i, SPECIFIC_FORCE]
         row[_STATE_FOOT] = extra[_FOOT] + sensed[i, FOOT_FORCES]
         # The measured attitude is the drift about the world's z ⊗ the true one ⊗ the turn.
-        attitude, turn = q[i, ATTITUDE], turns[now, i]
+        attitude, turn = q[i, ATTITUDE], turns[i]
         a, b, c, d = attitude[0], attitude[1], attitude[2], attitude[3]
         p, r, s, t = turn[0], turn[1], turn[2], turn[3]
         w, x = p * a - r * b - s * c - t * d, r * a + p * b + t * c - s * d

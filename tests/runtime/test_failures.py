@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 from dataclasses import replace
@@ -20,7 +21,7 @@ from quadriga.shared.errors import ProcessError
 from quadriga.shared.messages import Event, Status
 from quadriga.shared.recording.metadata import END
 from quadriga.shared.runtime.clock import monotonic, sleep
-from quadriga.shared.topics import CLOCK, COMMAND, EVENT, TRUTH
+from quadriga.shared.topics import CLOCK, COMMAND, EVENT, STATE, TRUTH
 from quadriga.team import launch
 from quadriga.team.launch import Launch
 from quadriga.team.run_report import report_folder
@@ -138,6 +139,12 @@ def test_kill_9_of_who_drives_time(
         last = team.log(name).splitlines()[-1]
         assert f"process sim of team 'team', seen by {name}: got none any more after" in last
     check_recording(team, LEAD_GONE, "process sim of team 'team', seen by recorder", capsys)
+    for robot in ("r1", "r2"):  # what the plant could no longer tell, its agents have told
+        said = re.search(r"after (\d+\.\d{3}) s", team.log(robot))
+        assert said is not None
+        for topic in (STATE, COMMAND):
+            entries = team.recording().entries(keys={topic.key("team", robot)})
+            assert [entry.tick for entry in entries] == [*range(1 + round(1000 * float(said[1])))]
 
 
 @pytest.mark.usefixtures("_compiled")

@@ -13,7 +13,6 @@ from quadriga.shared.bus.session import READY, Bus
 from quadriga.shared.codec import M, decode, encode
 from quadriga.shared.config.sections import Config
 from quadriga.shared.errors import MessageError
-from quadriga.shared.link.connections import link_key
 from quadriga.shared.messages import Command, Event, Reference, State, Status, Truth
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.robots.conventions import robot_names
@@ -111,7 +110,7 @@ def inject_noise(bus: Bus, team: Team) -> None:
     nan = np.full(12, np.nan)
     forged = encode(Command(1, 1, nan, nan, nan, nan, nan))
     name, robots = team.config.team.name, robot_names(team.config.team.robots)
-    keys = [link_key(name, robot, topic) for topic in (STATE, COMMAND) for robot in robots]
+    keys = [topic.link_key(name, robot) for topic in (STATE, COMMAND) for robot in robots]
     for topic in (topic for topic in TABLE if topic is not ESTOP):
         keys += [topic.key(name, robot) for robot in (robots if topic.per_robot else ("",))]
     for put in map(bus.publisher, keys):

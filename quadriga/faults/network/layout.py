@@ -91,7 +91,9 @@ class NetworkLayout:
             listen=self.endpoint(TEAM, 0),
             plaintext=True,  # no other machine is on this network
         )
-        return replace(config, bus=bus)
+        # Sockets reach from network to network: a world for all would be no longer apart.
+        link = "auto" if config.team.plant_per_robot else "bus"
+        return replace(config, bus=bus, plant=replace(config.plant, link=link))
 
     def _host(self, place: str) -> int:
         return _HOSTS[place] if place in _HOSTS else 1 + self.robots.index(place)

@@ -48,9 +48,9 @@ class TicksBus:
     def say(self, ticks: range) -> None:
         """States of r1 and commands that it gave, of each other tick."""
         for tick in ticks:
-            self.batch.add_state("r1", tick, np.zeros(STATE_SIZE), 0.0)
+            self.batch.add_state("r1", tick, np.zeros(STATE_SIZE), 0)
             if tick % 2:
-                self.batch.add_command("r1", tick, np.zeros(COMMAND_SIZE), 0.0)
+                self.batch.add_command("r1", tick, np.zeros(COMMAND_SIZE), 0)
         message = self.batch.take(ticks[-1])
         assert message is not None
         self.said.append((0, "team/sim/ticks", encode(message)))

@@ -29,7 +29,7 @@ from quadriga.shared.link.ticks import TickBatch
 from quadriga.shared.members import SIM
 from quadriga.shared.messages import Command, Message, State
 from quadriga.shared.robots.conventions import robot_names
-from quadriga.shared.runtime.clock import monotonic, sleep
+from quadriga.shared.runtime.clock import log_ns, monotonic, sleep
 from quadriga.shared.topics import TICKS, TICKS_MS
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import QUADRIGA
@@ -120,9 +120,9 @@ def traffic(config: Config, before: int) -> Iterator[tuple[str, Message]]:
         for key, message in several:
             robot = key.split("/")[1]
             if isinstance(message, State):
-                batch.add_state(robot, message.tick, message.row, monotonic())
+                batch.add_state(robot, message.tick, message.row, log_ns())
             elif isinstance(message, Command):
-                batch.add_command(robot, message.tick, message.row, monotonic())
+                batch.add_command(robot, message.tick, message.row, log_ns())
             else:
                 yield key, message
         if (gathered := batch.take(TICKS_MS * turn)) is not None:

@@ -15,15 +15,7 @@ from quadriga.shared.messages import Command, State, Ticks
 from quadriga.shared.robots.conventions import Array
 
 ROBOTS = ("r1", "r2", "r3")
-BEGUN = 1000.0
-
-
-class Clock:
-    now = BEGUN
-
-    def __call__(self) -> float:
-        return self.now
-
+BEGUN = 1_700_000_000_000_000_123  # ns since 1970
 
 rows = st.lists(
     st.tuples(
@@ -38,10 +30,9 @@ rows = st.lists(
 
 @given(rows)
 def test_what_was_gathered_comes_back(items: list[tuple[str, int, bool, Array]]) -> None:
-    clock = Clock()
-    batch, sent = TickBatch(ROBOTS, 1, clock), []
+    batch, sent = TickBatch(ROBOTS, 1), []
     for place, (robot, tick, is_state, row) in enumerate(items):
-        at = BEGUN + 1e-3 * place
+        at = BEGUN + 123_457 * place
         if is_state:
             batch.add_state(robot, tick, row, at)
             sent.append((f"team/{robot}/state", encode(State.from_row(tick, 10**6 * tick, row))))
@@ -50,7 +41,6 @@ def test_what_was_gathered_comes_back(items: list[tuple[str, int, bool, Array]])
             batch.add_command(robot, tick, long, at)
             of = Command.from_row(tick, 10**6 * tick, long)
             sent.append((f"team/{robot}/command", encode(of)))
-    clock.now = BEGUN + 1.0
     message = batch.take(5)
     assert (message is None) == (not items)
     assert batch.take(6) is None, "nothing is told twice"
@@ -58,20 +48,18 @@ def test_what_was_gathered_comes_back(items: list[tuple[str, int, bool, Array]])
         return
     came = list(gathered(encode(message)))
     assert [(item.key("team"), encode(item.message)) for item in came] == sent
-    assert [item.age for item in came] == pytest.approx(
-        [1.0 - 1e-3 * place for place in range(len(items))]
-    )
+    assert [item.log_ns for item in came] == [BEGUN + 123_457 * k for k in range(len(items))]
 
 
 def test_more_than_there_is_room_for_is_kept() -> None:
     batch = TickBatch(("r1",), 1)
     for tick in range(100):
-        batch.add_command("r1", tick, np.full(COMMAND_SIZE, tick), 0.0)
+        batch.add_command("r1", tick, np.full(COMMAND_SIZE, tick), BEGUN)
     message = batch.take(0)
     assert message is not None
     assert [item.message.tick for item in gathered(encode(message))] == list(range(100))
     assert not batch.is_full
-    batch.add_state("r1", 0, np.zeros(STATE_SIZE), 0.0)
+    batch.add_state("r1", 0, np.zeros(STATE_SIZE), BEGUN)
     assert not batch.is_full
 
 
@@ -89,7 +77,7 @@ def test_what_is_no_batch_has_nothing_in_it(payload: bytes) -> None:
 
 def test_a_robot_that_is_not_named_has_nothing_in_it() -> None:
     forged = Ticks(
-        0, 0, ("r1",), np.full((2, 3 + STATE_SIZE), 1.0), np.empty((0, 3 + COMMAND_SIZE))
+        0, 0, BEGUN, ("r1",), np.full((2, 3 + STATE_SIZE), 1.0), np.empty((0, 3 + COMMAND_SIZE))
     )
     assert decode(encode(forged), Ticks).states.shape == (2, 3 + STATE_SIZE)
     assert list(gathered(encode(forged))) == []
