@@ -146,6 +146,9 @@ class AgentShell:
                     got = link.received
                     inbox.take_state(State.from_row(got.tick, got.stamp_ns, got.state.copy()))
                     continue
+                if link.malformed:
+                    inbox.counters[f"dropped_{STATE.name}"] += link.malformed
+                    link.malformed = 0
                 if link.closed:
                     self._end_without_plant()
             self._take_mail()

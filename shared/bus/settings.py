@@ -107,6 +107,7 @@ def router_settings(listen: str, bus: BusConfig, rules: Mapping[str, Any]) -> di
         "connect/endpoints": [],
         "listen/endpoints": [listen],
         "scouting/gossip/enabled": False,
+        "scouting/delay": 0,  # Zenoh's 0.5 s, for nobody: a short walk is over meanwhile, unseen
         **_COMMON,
         **rules,
         **_certificates(bus, listen, ROUTER, listens=True),

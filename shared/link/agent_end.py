@@ -52,6 +52,7 @@ class AgentEnd:
         plant: name of the plant.
         ended: why the walk is over, as the plant says; "": it has not said so.
         closed: whether the plant is gone.
+        malformed: number of packets that were none.
     """
 
     def __init__(self, config: Config, robot: str, bus: Bus) -> None:
@@ -59,7 +60,7 @@ class AgentEnd:
         place = robot_names(config.team.robots).index(robot)
         self.plant = plant_name(robot if config.team.plant_per_robot else "")
         self.received, self.command = PacketBuffer(), RowPacket(COMMAND, place, COMMAND_SIZE)
-        self.ended, self.closed = "", False
+        self.ended, self.closed, self.malformed = "", False, 0
         self._hello = text_packet(HELLO, place, robot)
         self._way: Connection | None = None
         self._over_bus: BusConnection | None = None
@@ -125,6 +126,8 @@ class AgentEnd:
             if self.received.kind == END:
                 self.ended = self.received.text(size) or "over"
             return self.received.kind == STATE
+        else:
+            self.malformed += 1
         return False
 
     def send(self, packet: memoryview) -> None:

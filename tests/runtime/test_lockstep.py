@@ -16,7 +16,7 @@ from quadriga.shared.errors import MessageError
 from quadriga.shared.messages import Command, Event, Reference, State, Status, Truth
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.robots.conventions import robot_names
-from quadriga.shared.topics import ESTOP, EVENT, STATUS, TABLE
+from quadriga.shared.topics import COMMAND, ESTOP, EVENT, STATE, STATUS, TABLE
 from tests.listening import WAIT
 from tests.runtime.conftest import FOREVER, Make, Team, Watcher, await_tick, digests, router
 from tests.runtime.fortress import make_fortress, serving
@@ -77,7 +77,7 @@ def test_two_runs_of_one_scenario_give_the_same_bytes(make_team: Make) -> None:
 def test_malformed_messages_on_every_key_are_dropped_and_counted(
     make_team: Make, watcher: Watcher
 ) -> None:
-    team = make_team(recorder__enabled=True, world__duration=FOREVER)
+    team = make_team(recorder__enabled=True, world__duration=FOREVER, plant__link="bus")
     with team.launch(standing=False) as running:
         bus = watcher(team)
         assert bus.wait_for(READY, {"sim"}, WAIT, lambda: False)
@@ -106,14 +106,16 @@ def valid(recording: Recording, key: str, kind: type[M]) -> list[M]:
 
 
 def inject_noise(bus: Bus, team: Team) -> None:
-    """Publish what is no message on every key of the team, but where it is an emergency stop."""
+    """Publish what is no message on every key of the team, but the emergency stop's."""
     nan = np.full(12, np.nan)
     forged = encode(Command(1, 1, nan, nan, nan, nan, nan))
+    name, robots = team.config.team.name, robot_names(team.config.team.robots)
+    keys = [topic.link_key(name, robot) for topic in (STATE, COMMAND) for robot in robots]
     for topic in (topic for topic in TABLE if topic is not ESTOP):
-        for robot in robot_names(team.config.team.robots) if topic.per_robot else ("",):
-            put = bus.publisher(topic.key(team.config.team.name, robot))
-            for payload in (b"", b"\xc1\xff", b"\x81\xa6schema\x01", bytes(70_000), forged):
-                put(payload)
+        keys += [topic.key(name, robot) for robot in (robots if topic.per_robot else ("",))]
+    for put in map(bus.publisher, keys):
+        for payload in (b"", b"\xc1\xff", b"\x81\xa6schema\x01", bytes(70_000), forged):
+            put(payload)
 
 
 def test_real_time_says_what_came_late(make_team: Make) -> None:

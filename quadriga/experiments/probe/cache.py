@@ -32,7 +32,7 @@ from quadriga.workers import run_each
 # What a measured walk rests on besides this project's code.
 _LIBRARIES: Final = ("mujoco", "pin", "numpy", "numba", "daqp", "example-robot-data")
 # What responses do not depend on. Of the planner they depend on three keys alone.
-_OTHER_SECTIONS: Final = ("bridge", "bus", "identification", "recorder", "runtime")
+_OTHER_SECTIONS: Final = ("bridge", "bus", "identification", "plant", "recorder", "runtime")
 _OTHER_KEYS: Final = {"team": ("name", "plant", "plant_per_robot"), "world": ("scenario", "mode")}
 _OF_PLANNER: Final = ("interface", "N", "applied")
 

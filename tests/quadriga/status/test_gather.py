@@ -9,6 +9,7 @@ from quadriga.shared.codec import encode
 from quadriga.shared.codes import FALL
 from quadriga.shared.config.load import load
 from quadriga.shared.messages import Clock, Event, Message, Status
+from quadriga.shared.topics import CLOCK_MS
 from quadriga.status.gather import StatusFold
 from quadriga.status.record import Costs
 
@@ -47,17 +48,17 @@ def test_nothing_is_known_of_a_team_that_says_nothing() -> None:
 def test_pace_and_rates_are_those_since_the_last_look() -> None:
     fold = StatusFold(CONFIG)
     for k in range(11):
-        add(fold, "clock", clock(10 * k), SECOND + k * SECOND // 100)
+        add(fold, "clock", clock(CLOCK_MS * k), SECOND + k * SECOND // 100)
     fold.look(SECOND)
     for k in range(11, 21):  # half as fast, and the last but one is lost
         if k != 19:
-            add(fold, "clock", clock(10 * k), SECOND + k * SECOND // 50)
+            add(fold, "clock", clock(CLOCK_MS * k), SECOND + k * SECOND // 50)
     reading = fold.look(2 * SECOND)
-    assert reading.tick == 200
-    assert reading.pace == pytest.approx(100 / 300)  # 0.1 s of the world since 1.1 s: until 1.4 s
+    assert reading.tick == 1000
+    assert reading.pace == pytest.approx(500 / 300)  # 0.5 s of the world since 1.1 s: until 1.4 s
     (of,) = reading.topics
     assert (of.key, of.messages, of.lost) == ("team/clock", 9, 1)
-    assert of.per_world_s == pytest.approx(90.0)
+    assert of.per_world_s == pytest.approx(18.0)
     assert reading.lost == {"team/clock": 1}
     later = fold.look(3 * SECOND)
     assert (later.pace, later.lost, later.topics[0].lost) == (None, {}, 1)

@@ -120,7 +120,3 @@ def test_traffic_names_what_is_silent() -> None:
     assert "1000" in table
     assert table.count("–") == 2
     assert "opacity:0.5" in table.split("r2/plan")[0].rsplit("<tr>", 1)[1]
-    assert "*" not in table
-    told = words.format_traffic((KeyTraffic("r1/state", 980.0, None, 0.1, told=True), *rows))
-    assert told.count("&thinsp;*") == 1
-    assert "* not listened to" in told

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
 import pytest
 
-from quadriga.shared.bus.ring_buffer import Newest
 from quadriga.shared.codec import encode
 from quadriga.shared.config.sections import Config
-from quadriga.shared.messages import Status
+from quadriga.shared.link.packets import COMMAND_SIZE, STATE_SIZE
+from quadriga.shared.link.ticks import TickBatch
 from quadriga.shared.recording.reader import Recording
+from quadriga.shared.topics import TICKS_MS
 from quadriga.view.curves import SAMPLES, CurveWindow, axis_range, ticks_before
 from quadriga.view.live import _Feed
 from quadriga.view.readings import read_outputs
@@ -35,63 +36,43 @@ def test_rates_are_of_the_time_since_the_last_report() -> None:
     assert [row.per_s for row in traffic.report(12.0)] == [0.0, 0.0]
 
 
-def test_what_nobody_listens_to_is_counted_by_who_answers_it() -> None:
-    traffic = Traffic(10.0)
-    traffic.note("r1/status", 0, -1, 10.0)
-    traffic.note_told("r1/state", [], 10.0)
-    unknown = KeyTraffic("r1/state", 0.0, None, None, told=True)
-    assert traffic.report(10.5)[1] == unknown
-    # Since when the agent has counted what its first status tells is not known.
-    traffic.note_told("r1/state", [90], 10.5)
-    assert traffic.report(10.75)[1] == KeyTraffic("r1/state", 0.0, None, 0.25, told=True)
-    traffic.note_told("r1/state", [100, 100], 10.75)
-    traffic.note_told("r1/state", [50], 11.0)
-    traffic.note("r1/status", 3, 900, 11.0)
-    status, state = traffic.report(11.5)
-    assert status == KeyTraffic("r1/status", 4.0, 0, 0.5)
-    assert state == KeyTraffic("r1/state", 500.0, None, 0.5, told=True)
-    # A pause between two reports is not taken for a slower rate of what came before it.
-    assert traffic.report(12.5)[1] == KeyTraffic("r1/state", 0.0, None, 1.5, told=True)
-    traffic.note_told("r1/state", [200], 13.0)
-    assert traffic.report(13.0)[1].per_s == 100.0
-
-
-class StatusBus:
-    """A bus on which one agent has said its statuses, and nobody anything else."""
+class TicksBus:
+    """A bus on which a plant says batches of ticks, and nobody anything else."""
 
     team = "team"
 
     def __init__(self) -> None:
-        self.statuses: list[Any] = []
-        self.keys: list[str] = []
+        self.said: list[tuple[int, str, bytes]] = []
+        self.batch = TickBatch(("r1", "r2"), TICKS_MS)
 
-    def say_status(self, tick: int, answered: int) -> None:
-        nothing = np.zeros(0)
-        status = Status(tick, 0, "walk", "", "kalman", {}, {}, nothing, np.full(answered, 80.0))
-        payload = SimpleNamespace(to_bytes=lambda: encode(status))
-        self.statuses.append(SimpleNamespace(payload=payload))
+    def say(self, ticks: range) -> None:
+        """States of r1 and commands that it gave, of each other tick."""
+        for tick in ticks:
+            self.batch.add_state("r1", tick, np.zeros(STATE_SIZE), 0)
+            if tick % 2:
+                self.batch.add_command("r1", tick, np.zeros(COMMAND_SIZE), 0)
+        message = self.batch.take(ticks[-1])
+        assert message is not None
+        self.said.append((0, "team/sim/ticks", encode(message)))
 
-    def keep_newest(self, key: str, _most: int) -> Newest:
-        self.keys.append(key)
-        source = self.statuses if key == "team/r1/status" else []
-        return Newest(lambda: source.pop(0) if source else None)
+    def collect(self, *keys: str) -> Callable[[], list[tuple[int, str, bytes]]]:
+        assert "team/*/ticks" in keys
+        return lambda: [self.said.pop(0) for _ in range(len(self.said))]
 
 
-def test_a_live_view_knows_rates_of_states_and_commands_without_hearing_them() -> None:
-    bus = StatusBus()
+def test_a_live_view_tells_states_and_commands_out_of_batches_of_ticks() -> None:
+    bus = TicksBus()
     feed = _Feed(cast(Any, bus), build_team_shape(Config()), 10.0)
-    assert not any(key.endswith(("/state", "/command")) for key in bus.keys)
-    bus.say_status(100, 100)
-    feed.read(10.0)
-    for tick in (200, 300):
-        bus.say_status(tick, 100)
-    feed.read(10.25)
+    assert not feed.read(10.0)
+    for begin in (100, 110):
+        bus.say(range(begin, begin + 10))
+    assert feed.read(10.25)
     rows = {row.key: row for row in feed.traffic.report(10.25)}
-    for name in ("state", "command"):
-        assert rows[f"r1/{name}"] == KeyTraffic(f"r1/{name}", 800.0, None, 0.0, told=True)
-        assert rows[f"r2/{name}"] == KeyTraffic(f"r2/{name}", 0.0, None, None, told=True)
-    assert rows["r1/status"].behind_ms == 0
-    assert feed.gatherer.snapshot().statuses["r1"].tick == 300
+    assert rows["r1/state"] == KeyTraffic("r1/state", 80.0, 0, 0.0)
+    assert rows["r1/command"] == KeyTraffic("r1/command", 40.0, 0, 0.0)
+    for key in ("r2/state", "r2/command", "r1/status"):
+        assert rows[key] == KeyTraffic(key, 0.0, None, None)
+    assert feed.gatherer.snapshot().states["r1"].tick == 119
 
 
 def test_curves_hold_the_last_seconds(known_run: Path) -> None:

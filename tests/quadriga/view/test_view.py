@@ -11,7 +11,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from itertools import takewhile
+from itertools import groupby, takewhile
 from pathlib import Path
 from urllib.error import HTTPError
 from urllib.request import Request, urlopen
@@ -25,9 +25,12 @@ from quadriga.shared.bus.session import HERE, Bus
 from quadriga.shared.codec import encode
 from quadriga.shared.config.sections import BusConfig, Config
 from quadriga.shared.config.write import to_toml
-from quadriga.shared.messages import Message
-from quadriga.shared.runtime.clock import monotonic, sleep
-from quadriga.shared.topics import POSTURE, STATE
+from quadriga.shared.link.ticks import TickBatch
+from quadriga.shared.members import SIM
+from quadriga.shared.messages import Command, Message, State
+from quadriga.shared.robots.conventions import robot_names
+from quadriga.shared.runtime.clock import log_ns, monotonic, sleep
+from quadriga.shared.topics import TICKS, TICKS_MS
 from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import QUADRIGA
 from quadriga.team.spectator import view_beside
@@ -110,11 +113,20 @@ def test_a_recording_plays_and_pauses() -> None:
 
 
 def traffic(config: Config, before: int) -> Iterator[tuple[str, Message]]:
-    """What a team sends before a tick, its plant for who watches, too."""
-    for key, message in takewhile(lambda packet: packet[1].tick < before, packets(config, 0.3)):
-        yield key, message
-        if key.endswith(f"/{STATE.name}") and message.tick % POSTURE.period_ms == 0:
-            yield key.replace(STATE.name, POSTURE.name), message
+    """What a team sends before a tick; states and commands in batches of ticks."""
+    sent = takewhile(lambda packet: packet[1].tick < before, packets(config, 0.3))
+    batch = TickBatch(robot_names(config.team.robots), TICKS_MS)
+    for turn, several in groupby(sent, lambda packet: packet[1].tick // TICKS_MS):
+        for key, message in several:
+            robot = key.split("/")[1]
+            if isinstance(message, State):
+                batch.add_state(robot, message.tick, message.row, log_ns())
+            elif isinstance(message, Command):
+                batch.add_command(robot, message.tick, message.row, log_ns())
+            else:
+                yield key, message
+        if (gathered := batch.take(TICKS_MS * turn)) is not None:
+            yield TICKS.key("team", SIM), gathered
 
 
 def test_a_running_team_is_shown_and_hears_nothing(tmp_path: Path) -> None:
@@ -130,14 +142,14 @@ def test_a_running_team_is_shown_and_hears_nothing(tmp_path: Path) -> None:
         page.await_message(lambda sent: "nobody is heard yet" in str(sent.get("updates")))
         put = {}
         for key, _ in traffic(config, 401):
-            if key not in put:  # what comes a thousand times a second is not asked for
-                await_listener(team, key, there=not key.endswith(("command", "state")))
+            if key not in put:
+                await_listener(team, key)
                 put[key] = team.publisher(key)
         team.subscribe("team/**")
         for key, message in traffic(config, 600):
             put[key](encode(message))
         page.await_message(lambda sent: "simulator's truth" in str(sent.get("updates")))
-        page.await_message(lambda sent: "r1/posture" in str(sent.get("updates")))
+        page.await_message(lambda sent: "r1/command" in str(sent.get("updates")))
         page.await_message(named("/team/links/0", "Update"))
         assert not team.drain()
         end(process, signal.SIGTERM)

@@ -13,7 +13,7 @@ from tests.quadriga.identification.test_cache import ALL, changed
 WHOLE = ("sensors", "estimator", "gait", "controller", "world", "reference", "team", "motors")
 NOT = {*("team.name", "team.plant", "team.plant_per_robot", "world.scenario", "world.mode")}
 PLANNED = {"planner.interface", "planner.N", "planner.applied"}
-OTHERS = ("bridge", "bus", "identification", "recorder", "runtime", "planner")
+OTHERS = ("bridge", "bus", "identification", "plant", "recorder", "runtime", "planner")
 
 
 @pytest.mark.parametrize("section", [item.name for item in fields(Config)])
