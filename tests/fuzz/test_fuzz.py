@@ -51,6 +51,7 @@ KINDS: Final[Mapping[str, Callable[[Path], Target]]] = {
 }
 # Inputs of those kinds that most of the time is for, and the share of all inputs that is refused at
 # least: damage that nobody notices shows nothing. What walks say in messages that decode is read.
+# Keys of certificates are others each time.
 INPUTS = {"messages": 600, "configurations": 160, "predictors": 80, "recordings": 40}
 INPUTS |= {
     "packets": 600,
