@@ -79,7 +79,7 @@ def _low_level(axis: Axes, part: Part) -> None:
 def _bus(axis: Axes, part: Part) -> None:
     rows, width = part["rows"], 0.38
     place = np.arange(len(rows))
-    for k, (name, label) in enumerate((("bus", "bus"), ("socket", "raw sockets"))):
+    for k, (name, label) in enumerate((("bus", "bus"), ("socket", "sockets"))):
         at = place + (k - 0.5) * width
         median = np.array([row[name]["median"] for row in rows])
         axis.bar(at, median, width, color=(_COLOURS[0], _GREY)[k], label=label)

@@ -132,7 +132,7 @@ def _low_level(part: Part) -> list[str]:
 def _bus(part: Part) -> list[str]:
     return [
         f"n = {row['robots']}, messages of a tick: {row['bus']['median']:.0f} µs, p99 "
-        f"{row['bus']['p99']:.0f}; raw sockets {row['socket']['median']:.0f}, p99 "
+        f"{row['bus']['p99']:.0f}; sockets {row['socket']['median']:.0f}, p99 "
         f"{row['socket']['p99']:.0f} (× {row['bus']['median'] / row['socket']['median']:.1f})"
         for row in part["rows"]
     ]

@@ -50,7 +50,7 @@ def low_level(options: Options, console: Console, tell: Tell) -> Part:
 
 
 def bus(options: Options, _console: Console, tell: Tell) -> Part:
-    """The messages of a tick, over the Bus and over raw sockets."""
+    """The messages of a tick, over the bus and over sockets."""
     from benchmarks.messaging import measure
 
     rows = []

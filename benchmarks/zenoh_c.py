@@ -1,7 +1,7 @@
-"""The messages of a tick by Zenoh's own implementation in C, beside the Bus and raw sockets.
+"""The messages of a tick by Zenoh's own implementation in C, beside both ways of the plant link.
 
 `python -m benchmarks.zenoh_c DIR`, where zenoh-pico is installed in DIR (docs/benchmarks.md), tells
-what a tick's messages cost without Python: `zenoh_c.c` sends and answers the same bytes between as
+what a tick's messages cost without Python: `zenoh_c.c` sends and answers as many bytes between as
 many processes, scheduled alike. It takes turns with `benchmarks.messaging`.
 """
 
@@ -18,7 +18,8 @@ from typing import Final
 
 import numpy as np
 
-from benchmarks.messaging import command_bytes, measure, state_bytes
+from benchmarks.messaging import measure
+from quadriga.shared.link.packets import COMMAND_SIZE, HEADER, STATE_SIZE
 from quadriga.shared.robots.conventions import robot_names
 from quadriga.shared.runtime.signals import interrupt_on_sigterm
 from quadriga.tables import Table, print_tables
@@ -95,11 +96,12 @@ def time_c(program: Path, robots: int, ticks: int) -> float:
         CalledProcessError: one of its processes has failed.
     """
     endpoint = free_endpoint()
+    state, command = (str(HEADER.size + 8 * size) for size in (STATE_SIZE, COMMAND_SIZE))
     with ExitStack() as team:
-        world = [str(program), "world", endpoint, str(robots), str(len(state_bytes())), str(ticks)]
+        world = [str(program), "world", endpoint, str(robots), state, str(ticks)]
         sim = team.enter_context(_running(world))
         for name in robot_names(robots):
-            robot = [str(program), "robot", endpoint, name, str(len(command_bytes()))]
+            robot = [str(program), "robot", endpoint, name, command]
             team.enter_context(_running(robot))
         said, _ = sim.communicate()
         if sim.returncode:

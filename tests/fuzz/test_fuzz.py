@@ -51,12 +51,9 @@ KINDS: Final[Mapping[str, Callable[[Path], Target]]] = {
 }
 # Inputs of those kinds that most of the time is for, and the share of all inputs that is refused at
 # least: damage that nobody notices shows nothing. What walks say in messages that decode is read.
+# Keys of certificates are others each time.
 INPUTS = {"messages": 600, "configurations": 160, "predictors": 80, "recordings": 40}
-INPUTS |= {
-    "packets": 600,
-    "certificates": 200,
-    "authorities": 200,
-}  # whose keys are others each time
+INPUTS |= {"packets": 600, "certificates": 200, "authorities": 200}
 FEW = 20
 REFUSED = 0.25
 READ = ("traces", "exports", "replays", "realtime-replays")

@@ -247,7 +247,9 @@ def test_the_bytes_of_a_row_are_those_of_messagepack(
     assert encode(sent) == msgpack.packb(body)
     flat = codec._layout(kind).flat
     assert flat is not None
-    assert flat.read(arrays).tobytes() == sent.row.tobytes()
+    read = flat.read(arrays)
+    assert read is not None
+    assert read.tobytes() == sent.row.tobytes()
 
 
 @of_every_flat_type

@@ -64,12 +64,7 @@ def test_more_than_there_is_room_for_is_kept() -> None:
 
 
 @pytest.mark.parametrize(
-    "payload",
-    [
-        b"",
-        b"\x80",
-        encode(State(0, 0, *np.zeros((3, 12)), np.zeros(4), *np.zeros((2, 3)), np.zeros(4))),
-    ],
+    "payload", [b"", b"\x80", encode(State.from_row(0, 0, np.zeros(STATE_SIZE)))]
 )
 def test_what_is_no_batch_has_nothing_in_it(payload: bytes) -> None:
     assert gathered("team", payload) == []
