@@ -10,7 +10,7 @@ from typing import Final, cast
 
 import numpy as np
 
-from quadriga.agents.inbox import Inbox, parse_message_id
+from quadriga.agents.inbox import Inbox, decode_packet, parse_message_id
 from quadriga.agents.planning.interface import Expected
 from quadriga.drive.client import ControlLink
 from quadriga.drive.driver_words import read_driver_word
@@ -27,7 +27,6 @@ from quadriga.shared.config.load import load
 from quadriga.shared.errors import MessageError
 from quadriga.shared.link import packets as packet_kinds
 from quadriga.shared.link.agent_end import AgentEnd
-from quadriga.shared.link.connections import link_key
 from quadriga.shared.link.packets import END, HELLO, STATE_SIZE, WELCOME, RowPacket, text_packet
 from quadriga.shared.link.ticks import gathered
 from quadriga.shared.members import SIM, team_members
@@ -76,9 +75,9 @@ class Messages:
             self._fold.look(self._heard)
         line = format_entry(entry, full=True)
         assert line == printable_line(line)
-        for item in gathered(content):
-            encode(item.message)
-            assert self._heard - round(1e9 * item.age) >= -(1 << 62)
+        for item in gathered("team", content):
+            decode_packet(item.topic, item.payload)
+            assert 0 <= item.log_ns < 1 << 63
         decode(content, self._topic.type)
 
 
@@ -87,7 +86,7 @@ def packets(_folder: Path) -> Reader:
     server, bus = served()
     server.publish()
     agent, inbox = AgentEnd(server.config, "r1", cast("Bus", bus)), Inbox(server.config, "r1", ())
-    plant_says = bus.heard[link_key("team", "r1", STATE)]
+    plant_says = bus.heard[STATE.link_key("team", "r1")]
     plant_says(text_packet(WELCOME))
     agent.open(lambda: False)
     state = RowPacket(packet_kinds.STATE, 0, STATE_SIZE)

@@ -18,7 +18,6 @@ from quadriga.shared.codec import MAX_TEXT, decode
 from quadriga.shared.config.sections import PlantConfig
 from quadriga.shared.errors import ProcessError
 from quadriga.shared.link import packets
-from quadriga.shared.link.connections import link_key
 from quadriga.shared.link.packets import (
     COMMAND_SIZE,
     HEADER,
@@ -33,7 +32,7 @@ from quadriga.shared.topics import CLOCK, COMMAND, EVENT, STATE, TICKS, TRUTH
 from quadriga.sim_server.world.world import World
 from tests.sim_server.standing import configured
 
-LINK, BATCHES = link_key("team", "r1", STATE), TICKS.key("team", "sim")
+LINK, BATCHES = STATE.link_key("team", "r1"), TICKS.key("team", "sim")
 
 
 class Listener:
@@ -62,7 +61,7 @@ class Listener:
 
     def answer(self, packet: bytes) -> None:
         """Send what the agent of r1 does."""
-        self.heard[link_key("team", "r1", COMMAND)](packet)
+        self.heard[COMMAND.link_key("team", "r1")](packet)
 
     def payloads(self, key: str) -> list[bytes]:
         return [payload for sent, _, payload in self.packets if sent == key]
@@ -144,12 +143,12 @@ def test_who_looks_on_gets_each_state_and_command_in_batches_of_some_ticks() -> 
         assert server.receive("r1", tick, wait=False) == NEWER
         server.step({})
     server.publish_batch()
-    batches = [list(gathered(payload)) for payload in listener.payloads(BATCHES)]
+    batches = [gathered("team", payload) for payload in listener.payloads(BATCHES)]
     assert [len(batch) for batch in batches] == [1, 20, 20, 9]
-    told = [(item.topic, item.robot, item.message.tick) for batch in batches for item in batch]
+    told = [(item.topic, item.robot, item.tick) for batch in batches for item in batch]
     assert told == [(topic, "r1", tick) for tick in range(25) for topic in (STATE, COMMAND)]
     sent = [payload[HEADER.size :] for payload in listener.payloads(LINK)][1:]  # after a welcome
-    states = [item.message.row.tobytes() for batch in batches for item in batch][::2]
+    states = [decode(i.payload, State).row.tobytes() for batch in batches for i in batch][::2]
     assert states == sent
 
 

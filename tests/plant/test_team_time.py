@@ -18,7 +18,7 @@ EVERYBODY = {"plant_r1", "plant_r2", "plant_r3", "r1"}
 
 
 def ticks(tick: int) -> bytes:
-    return encode(Ticks(tick, tick * 10**6, (), np.zeros((0, 53)), np.zeros((0, 63))))
+    return encode(Ticks(tick, tick * 10**6, 0, (), np.zeros((0, 53)), np.zeros((0, 63))))
 
 
 def clock(tick: int) -> bytes:

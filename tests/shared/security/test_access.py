@@ -8,7 +8,6 @@ import pytest
 
 from quadriga.shared.codec import MAX_BYTES
 from quadriga.shared.config.load import load
-from quadriga.shared.link.connections import link_key
 from quadriga.shared.runtime.places import SOURCE
 from quadriga.shared.security.access import (
     Rights,
@@ -18,7 +17,7 @@ from quadriga.shared.security.access import (
     team_identities,
     team_rights,
 )
-from quadriga.shared.topics import COMMAND, STATE, TABLE, Topic
+from quadriga.shared.topics import COMMAND, STATE, TABLE
 
 EACH = {"team.plant_per_robot": True, "world.mode": "realtime", "team.yokes": "none"}
 TWO = load(None, {"team.robots": 2})
@@ -124,13 +123,9 @@ def test_nobody_takes_more_than_its_share_of_the_router() -> None:
     assert found["transport/unicast/max_sessions"] > len(team_identities(TWO))
 
 
-def key_of(team: str, robot: str, topic: Topic) -> str:
-    return topic.key(team, robot)
-
-
 def test_every_topic_has_somebody_who_may_send_it() -> None:
     for found in (rights(), rights(**EACH)):
         sent = {key for each in found.values() for key in each.publishes}
         for topic in TABLE:
-            key = link_key if topic in (STATE, COMMAND) else key_of
-            assert {key("team", robot, topic) for robot in ("r1", "r2")} <= sent
+            key = topic.link_key if topic in (STATE, COMMAND) else topic.key
+            assert {key("team", robot) for robot in ("r1", "r2")} <= sent
