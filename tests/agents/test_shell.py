@@ -48,7 +48,8 @@ class Played:
         self.others = [e for e in entries if e.key not in own]
         self.mail, self.sent, self.told = Packets(), Packets(), list[bytes]()
         self.received, self.command = PacketBuffer(), RowPacket(COMMAND, 0, COMMAND_SIZE)
-        self.ended, self.closed, self.says, self.tick = "", False, says, -1
+        self.ended, self.closed, self.malformed = "", False, 0
+        self.says, self.tick = says, -1
 
     # The link.
 
