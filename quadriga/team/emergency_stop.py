@@ -112,7 +112,7 @@ class EmergencyStop:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._talk.bus.close()
+        self._talk.close()
 
 
 def stop_team(config: Config, reason: str, say: Say, tell: Say = keep_quiet) -> None:

@@ -19,6 +19,7 @@ from quadriga.shared.topics import EVENT, STATUS, Topic, topics_for
 
 SEARCH: Final = 5.0  # s, longest search for the team
 _AGAIN, _OFTEN_FOR = 0.1, 1.0  # s: how often a word is said again at first, and for how long
+_LATE: Final = 0.5  # s, in which a recorder finds this process, or it is not there
 Say = Callable[[str], None]
 """Tells the person, in a line, what is done for them meanwhile."""
 _MOST_EVENTS: Final = 10_000  # that are kept; more can only be a flood
@@ -162,4 +163,12 @@ class TeamTalk:
         return self
 
     def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Leave, once all of the team have been told that may still turn up."""
+        deadline = monotonic() + _LATE
+        while self._repeat is not None and self._members - self._told and monotonic() < deadline:
+            self.look(POLL)
+        self._repeat = None
         self.bus.close()

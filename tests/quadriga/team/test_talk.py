@@ -48,6 +48,19 @@ def test_a_word_is_repeated_for_a_second_and_to_those_who_turn_up_later() -> Non
         assert len(plant.drain()) == 1, "once for who is new"
 
 
+def test_a_word_reaches_a_recorder_that_finds_its_speaker_once_all_is_done() -> None:
+    config = load(None, {"team.robots": 1, "bus.endpoint": free_endpoint()})
+    with Bus.open(config.bus, "team", SIM) as plant, TeamTalk(config, members.STOP) as talk:
+        plant.declare(HERE)
+        assert talk.follow(lambda: talk.look() == {SIM}, 20.0)
+        talk.publisher(STOP)(WORD)
+        with Bus.open(config.bus, "team", members.RECORDER) as recorder:
+            recorder.subscribe(STOP.key("team"))
+            recorder.declare(HERE)
+            talk.close()
+            assert {payload for _, payload in recorder.drain()} == {encode(WORD)}
+
+
 @contextmanager
 def robot_that_is(mode: str, config: Config, *, deaf: bool = False) -> Iterator[None]:
     """A plant and an agent that say how the robot is, and hear whatever is said, or nothing."""
