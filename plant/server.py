@@ -98,6 +98,11 @@ class PlantServer:
         The truth is the whole team's: a plant of one robot among several does not know it.
         """
         plant, tick = self.plant, self.plant.tick
+        # What has come over the bus before the states of this tick are out: no command of this tick
+        # can be among it. Taken in later, a forged one would come before the robot's own.
+        for name in self.link.heard_by_others:
+            while self.receive(name, 0 if self._realtime else tick, wait=False) in (NEWER, REFUSED):
+                pass
         # States come first: agents wait for them, and in real time they have half a millisecond.
         states = plant.states()
         for name, state in states.items():

@@ -163,7 +163,7 @@ class Session:
         self._parts.write_all(
             [
                 (item.key, item.tick, item.log_ns, item.payload)
-                for item in gathered(self._bus.team, payload)
+                for item in gathered(key, payload)
                 if recorded(item.key) and item.tick > told.get(item.key, -1)
             ]
         )

@@ -82,7 +82,7 @@ def entries_from_bus(
                     head = envelope(payload)
                     yield ChunkEntry(key, -1 if head is None else head[0], now, payload)
                 if key.endswith(f"/{TICKS.name}"):
-                    for item in gathered(team, payload):
+                    for item in gathered(key, payload):
                         if _matches(patterns, item.key):
                             yield ChunkEntry(item.key, item.tick, item.log_ns, item.payload)
 

@@ -66,7 +66,7 @@ class TeamListener:
             for at_ns, key, payload in sorted(arrived, key=lambda arrival: arrival[0]):
                 head = envelope(payload)
                 self._fold.add(key, payload, -1 if head is None else head[0], at_ns)
-                for item in gathered(self._bus.team, payload) if _is_batch(key) else ():
+                for item in gathered(key, payload) if _is_batch(key) else ():
                     self._fold.add(item.key, item.payload, item.tick, at_ns)
 
     def look(self) -> TeamStatus:

@@ -85,7 +85,7 @@ class _Feed:
 
     def _take_ticks(self, key: str, payload: bytes, now: float) -> None:
         newest = dict[str, LinkMessage]()
-        for item in gathered(key.partition("/")[0], payload):
+        for item in gathered(key, payload):
             self.traffic.note(_short(item.key), 1, item.tick, now)
             if item.topic is STATE:
                 newest[item.robot] = item

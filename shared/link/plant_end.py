@@ -97,6 +97,11 @@ class PlantEnd:
         self._address = address
         Thread(target=self._accept, args=(self._listener,), daemon=True).start()
 
+    @property
+    def heard_by_others(self) -> list[str]:
+        """Robots whose packets go over the bus, where others may be who send some."""
+        return [name for name, way in self._over_bus.items() if self.connected.get(name) is way]
+
     def send(self, name: str, state: State) -> None:
         """Send a robot's agent its state."""
         way, packet = self.connected.get(name), self._states[name]

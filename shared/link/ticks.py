@@ -10,6 +10,7 @@ import numpy as np
 from quadriga.shared.codec import MAX_INTEGER, MAX_TICK, decode, encode_rows
 from quadriga.shared.errors import MessageError
 from quadriga.shared.link.packets import COMMAND_SIZE, STATE_SIZE
+from quadriga.shared.members import SIM, plant_name
 from quadriga.shared.messages import Command, State, Ticks
 from quadriga.shared.robots.conventions import Array
 from quadriga.shared.topics import COMMAND, STATE, Topic
@@ -107,11 +108,17 @@ class _RowBuffer:
         return rows
 
 
-def gathered(team: str, payload: bytes) -> list[LinkMessage]:
-    """The states and commands of a batch, oldest first; none of what is no batch, or no row."""
+def gathered(key: str, payload: bytes) -> list[LinkMessage]:
+    """The states and commands of a batch, oldest first; none of what is no batch, or no row.
+
+    `key` is that of the batch: an agent, or the plant of one robot, speaks for that robot alone.
+    """
     try:
         ticks = decode(payload, Ticks)
     except MessageError:
+        return []
+    team, sender, _ = key.split("/")
+    if sender != SIM and any(sender not in (name, plant_name(name)) for name in ticks.robots):
         return []
     found, most = list[LinkMessage](), (len(ticks.robots) - 1, MAX_TICK - 1, _LONGEST_NS)
     for topic, kind, given in (STATE, State, ticks.states), (COMMAND, Command, ticks.commands):

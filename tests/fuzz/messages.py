@@ -75,7 +75,7 @@ class Messages:
             self._fold.look(self._heard)
         line = format_entry(entry, full=True)
         assert line == printable_line(line)
-        for item in gathered("team", content):
+        for item in gathered("team/sim/ticks", content):
             decode_packet(item.topic, item.payload)
             assert 0 <= item.log_ns < 1 << 63
         decode(content, self._topic.type)

@@ -143,7 +143,7 @@ def test_who_looks_on_gets_each_state_and_command_in_batches_of_some_ticks() -> 
         assert server.receive("r1", tick, wait=False) == NEWER
         server.step({})
     server.publish_batch()
-    batches = [gathered("team", payload) for payload in listener.payloads(BATCHES)]
+    batches = [gathered("team/sim/ticks", payload) for payload in listener.payloads(BATCHES)]
     assert [len(batch) for batch in batches] == [1, 20, 20, 9]
     told = [(item.topic, item.robot, item.tick) for batch in batches for item in batch]
     assert told == [(topic, "r1", tick) for tick in range(25) for topic in (STATE, COMMAND)]

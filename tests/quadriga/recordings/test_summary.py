@@ -316,17 +316,7 @@ def test_what_came_late_in_real_time(write_run: WriteRun) -> None:
     counters = {"ticks": 6000, "overruns": 4, "r1.late": 300, "r1.held": 7, "r2.late": 0}
     nothing = np.zeros(0)
     sim_status = msg.Status(6000, 0, "realtime", "", "", ages, counters, nothing, nothing)
-    own = msg.Status(
-        6001,
-        0,
-        "walk",
-        "",
-        "kalman",
-        {"jitter.max": 1.5},
-        {},
-        nothing,
-        nothing,
-    )
+    own = msg.Status(6001, 0, "walk", "", "kalman", {"jitter.max": 1.5}, {}, nothing, nothing)
     run = write_run(run_config(), extra=[("team/sim/status", sim_status), ("team/r1/status", own)])
     summary = summarise(run)
     late = summary["realtime"]

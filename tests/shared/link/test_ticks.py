@@ -46,7 +46,7 @@ def test_what_was_gathered_comes_back(items: list[tuple[str, int, bool, Array]])
     assert batch.take(6) is None, "nothing is told twice"
     if message is None:
         return
-    came = gathered("team", encode(message))
+    came = gathered("team/sim/ticks", encode(message))
     assert [(item.key, item.payload) for item in came] == sent
     assert [item.log_ns for item in came] == [BEGUN + 123_457 * k for k in range(len(items))]
 
@@ -57,7 +57,7 @@ def test_more_than_there_is_room_for_is_kept() -> None:
         batch.add_command("r1", tick, np.full(COMMAND_SIZE, tick), BEGUN)
     message = batch.take(0)
     assert message is not None
-    assert [item.tick for item in gathered("team", encode(message))] == list(range(100))
+    assert [item.tick for item in gathered("team/sim/ticks", encode(message))] == list(range(100))
     assert not batch.is_full
     batch.add_state("r1", 0, np.zeros(STATE_SIZE), BEGUN)
     assert not batch.is_full
@@ -67,7 +67,7 @@ def test_more_than_there_is_room_for_is_kept() -> None:
     "payload", [b"", b"\x80", encode(State.from_row(0, 0, np.zeros(STATE_SIZE)))]
 )
 def test_what_is_no_batch_has_nothing_in_it(payload: bytes) -> None:
-    assert gathered("team", payload) == []
+    assert gathered("team/sim/ticks", payload) == []
 
 
 @pytest.mark.parametrize(
@@ -80,4 +80,16 @@ def test_a_row_that_none_can_be_is_passed_over(place: int, wrong: float) -> None
     states[1, place] = wrong
     forged = Ticks(0, 0, BEGUN, ("r1",), states, np.empty((0, 3 + COMMAND_SIZE)))
     assert np.array_equal(decode(encode(forged), Ticks).states, states, equal_nan=True)
-    assert len(gathered("team", encode(forged))) == 2
+    assert len(gathered("team/sim/ticks", encode(forged))) == 2
+
+
+def test_who_speaks_for_one_robot_is_not_believed_of_another() -> None:
+    for sender, robot, believed in (
+        *(("r1", "r1", 1), ("plant_r1", "r1", 1), ("sim", "r2", 1)),
+        *(("r1", "r2", 0), ("plant_r1", "r2", 0), ("sims", "r1", 0)),
+    ):
+        batch = TickBatch((robot,), 1)
+        batch.add_state(robot, 3, np.zeros(STATE_SIZE), BEGUN)
+        message = batch.take(3)
+        assert message is not None
+        assert len(gathered(f"team/{sender}/ticks", encode(message))) == believed
