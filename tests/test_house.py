@@ -25,7 +25,7 @@ BUDGETS: Final[Mapping[str, int]] = {
     "shared": 9_064,  # planned: 7,200; left: Unitree's protocols, the barrier; came: the plant link
     "quadriga": 39_640,  # planned: 18,200; left: harnesses of experiments, report, commands
     "benchmarks": 4_265,  # planned: 1,800
-    "tests": 45_464,  # planned: 28,000
+    "tests": 45_471,  # planned: 28,000
 }
 COUNTED: Final = (".py", ".js", ".css", ".html")
 MOST_ARGUMENTS: Final = 8

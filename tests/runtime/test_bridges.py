@@ -98,12 +98,13 @@ def modes_of(recording: Recording) -> list[str]:
 
 @pytest.mark.nightly
 @pytest.mark.usefixtures("_realtime")
+@pytest.mark.parametrize("link", ["local", "bus"])
 @pytest.mark.parametrize("config", ["a1"], indirect=True)
 def test_a_robot_stands_up_walks_and_lies_down_through_its_own_protocol(
-    file: Path, robots: subprocess.Popen[bytes], tmp_path: Path
+    file: Path, robots: subprocess.Popen[bytes], tmp_path: Path, link: str
 ) -> None:
     out = tmp_path / "run"
-    done = walk(file, out, "--armed")
+    done = walk(file, out, "--armed", "--set", f"plant.link={link}")
     said = (out / "logs" / "plant_r1.log").read_text(encoding="utf-8")
     ways = ["r1: standing-up", "r1: stand", "r1: walk"]
     # Where a busy machine gives it too little time it stops, with a reason: a good end, too.

@@ -50,11 +50,13 @@ def test_a_function_walks_and_is_judged_and_not_recomputed(make_team: Make) -> N
         replay(team.folder / "run.mcap", (), {}, None, None, Console(quiet=True))
 
 
-def test_a_program_without_quadriga_is_one_of_the_team(make_team: Make) -> None:
+@pytest.mark.parametrize("link", ["local", "bus"])
+def test_a_program_without_quadriga_is_one_of_the_team(make_team: Make, link: str) -> None:
     assert not re.search(r"^\s*(import|from) quadriga", BARE.read_text(), re.MULTILINE)
     team = make_team(
         team__robots=2,
         team__agent_command=f"python {BARE}",
+        plant__link=link,
         world__duration=0.6,
         recorder__enabled=True,
     )
