@@ -55,7 +55,7 @@ _N_SENSORS: Final = N_JOINTS + 2
 _Q, _V = State.CUTS["q_joint"], State.CUTS["v_joint"]
 _QUAT, _GYRO = State.CUTS["imu_quat_wxyz"], State.CUTS["imu_gyro"]
 _ACCEL: Final = State.CUTS["imu_accel"]
-_N_STATE: Final = max(cut.stop for cut in State.CUTS.values())
+_N_STATE: Final = State.SIZE
 
 
 # What is remembered of the readings from one tick to the next, see `RobotState` of such rows.

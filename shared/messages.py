@@ -67,6 +67,7 @@ class Flat(Message):
 
     __slots__ = ("row",)
     CUTS: ClassVar[dict[str, slice]] = {}
+    SIZE: ClassVar[int] = 0  # numbers of a row
     row: Array
 
     def __init__(self, tick: int, stamp_ns: int, *arrays: Array, **named: Array) -> None:
@@ -105,6 +106,7 @@ def flat_record(cls: type[F]) -> type[F]:
     made.CUTS = cuts_of(
         {f.name: f.metadata["shape"][0] for f in fields(made) if "shape" in f.metadata}
     )
+    made.SIZE = max(cut.stop for cut in made.CUTS.values())
     for name, cut in made.CUTS.items():
         setattr(made, name, property(partial(_view, cut)))
     return made  # type: ignore[no-any-return]
@@ -167,14 +169,14 @@ class Ticks(Message):
     robots: tuple[str, ...] = plain(list, "names of the robots")
     states: Array = array(
         "s",
-        len(_GATHERED) + max(cut.stop for cut in State.CUTS.values()),
+        len(_GATHERED) + State.SIZE,
         entries=(*_GATHERED, *State.entries()),
         unit="1, ms, ns, then as in State",
         finite=False,
     )
     commands: Array = array(
         "c",
-        len(_GATHERED) + max(cut.stop for cut in Command.CUTS.values()),
+        len(_GATHERED) + Command.SIZE,
         entries=(*_GATHERED, *Command.entries()),
         unit="1, ms, ns, then as in Command",
         finite=False,

@@ -6,7 +6,6 @@ killed one leaves behind. Over the bus its token has vanished.
 
 from __future__ import annotations
 
-import os
 import socket
 import struct
 from collections.abc import Callable
@@ -158,8 +157,3 @@ def connect(address: Path) -> LocalConnection:
         link.close()
         raise
     return LocalConnection(link)
-
-
-def own_user() -> int:
-    """The user of this process."""
-    return os.getuid()

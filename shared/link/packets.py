@@ -34,8 +34,8 @@ HEADER: Final = struct.Struct("<HBBIqq8s")
 TEXT_MOST: Final = 512  # bytes of a text
 _WHEN: Final = struct.Struct("<qq")
 _WHEN_AT: Final = 8
-STATE_SIZE: Final = max(cut.stop for cut in State.CUTS.values())
-COMMAND_SIZE: Final = max(cut.stop for cut in Command.CUTS.values())
+STATE_SIZE: Final = State.SIZE
+COMMAND_SIZE: Final = Command.SIZE
 _SIZES: Final = {STATE: HEADER.size + 8 * STATE_SIZE, COMMAND: HEADER.size + 8 * COMMAND_SIZE}
 MOST: Final = HEADER.size + max(8 * STATE_SIZE, 8 * COMMAND_SIZE, TEXT_MOST)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import socket
 from collections.abc import Sequence
 from contextlib import suppress
@@ -21,7 +22,6 @@ from quadriga.shared.link.connections import (
     LocalConnection,
     listen,
     local_address,
-    own_user,
 )
 from quadriga.shared.link.packets import (
     END,
@@ -147,7 +147,7 @@ class PlantEnd:
                 link.close()
                 continue
             way = LocalConnection(link)
-            foreign = way.user != own_user() and f"a process of user {way.user}"
+            foreign = way.user != os.getuid() and f"a process of user {way.user}"
             if not self._greet(hello, way, foreign or ""):
                 way.close()
 

@@ -214,8 +214,9 @@ def test_another_version_is_refused(
 def test_a_process_of_another_user_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     team = Team("local")
     with team.stack:
-        monkeypatch.setattr("quadriga.shared.link.plant_end.own_user", lambda: os.getuid() + 1)
-        assert f"refused: a process of user {os.getuid()}" in refused(team)
+        other = os.getuid() + 1
+        monkeypatch.setattr(connections.LocalConnection, "user", other)
+        assert f"refused: a process of user {other}" in refused(team)
 
 
 def test_the_socket_is_in_a_folder_of_this_user_alone() -> None:
