@@ -214,8 +214,7 @@ def test_another_version_is_refused(
 def test_a_process_of_another_user_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     team = Team("local")
     with team.stack:
-        other = os.getuid() + 1
-        monkeypatch.setattr(connections.LocalConnection, "user", other)
+        monkeypatch.setattr(connections.LocalConnection, "user", (other := os.getuid() + 1))
         assert f"refused: a process of user {other}" in refused(team)
 
 
