@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Self
 
 from quadriga.shared.errors import RecordingError
+from quadriga.shared.link.ticks import LinkMessage
 from quadriga.shared.recording.quota import Quota
 from quadriga.shared.recording.reader import name_of
 from quadriga.shared.recording.ticks import lost_by_key
@@ -73,9 +74,9 @@ class Parts:
         self._make_room(len(payload) + MESSAGE_SIZE)
         self._writer.write(key, payload, log_time_ns)
 
-    def write_all(self, messages: Sequence[tuple[str, int, int, bytes]]) -> None:
-        """Append messages of a plant link: key, tick, log time, payload."""
-        self._make_room(sum(MESSAGE_SIZE + len(payload) for *_, payload in messages))
+    def write_all(self, messages: Sequence[LinkMessage]) -> None:
+        """Append messages of a plant link."""
+        self._make_room(sum(MESSAGE_SIZE + len(message.payload) for message in messages))
         self._writer.write_all(messages)
 
     def _make_room(self, size: int) -> None:

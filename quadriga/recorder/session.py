@@ -27,7 +27,7 @@ from quadriga.shared.topics import EVENT, TICKS, find_topic
 FLUSH: Final = 0.05  # s wall between two flushes: a kill loses what has come since the last
 QUIET: Final = 0.2  # s wall without a message after which nothing more is under way
 DRAIN_LIMIT: Final = 5.0  # s wall, longest drain of a team that does not fall silent
-_GATHER: Final = 0.004  # s wall, pause between looks at the inbox: one wake-up for many messages
+_GATHER: Final = 0.02  # s wall, pause between looks at the inbox: one wake-up for many messages
 _SLICE: Final = 500  # messages that are written at most before a look at the clock
 _LOOK: Final = 1.0  # s wall after which a late recorder reports what it has
 _TICKS: Final = f"/{TICKS.name}"
@@ -160,13 +160,10 @@ class Session:
         """
         robot, recorded = find_topic(key)[1], self._keys
         told = self._parts.ticks if robot in self._robots else {}
-        self._parts.write_all(
-            [
-                (item.key, item.tick, item.log_ns, item.payload)
-                for item in gathered(key, payload)
-                if recorded(item.key) and item.tick > told.get(item.key, -1)
-            ]
-        )
+        items = gathered(key, payload)
+        if told:
+            items = [item for item in items if item.tick > told.get(item.key, -1)]
+        self._parts.write_all([item for item in items if recorded(item.key)])
 
     def _note_event(self, payload: bytes) -> None:
         with suppress(MessageError):

@@ -340,10 +340,13 @@ class Bus:
     def _publisher(
         self, key: str, waits: bool, priority: zenoh.Priority
     ) -> Callable[[bytes], None]:
-        control = zenoh.CongestionControl.BLOCK if waits else zenoh.CongestionControl.DROP
-        express = waits or priority is not zenoh.Priority.DATA  # see `_COMMON` of the settings
         publisher = self._session.declare_publisher(
-            key, express=express, congestion_control=control, priority=priority
+            key,
+            express=priority is not zenoh.Priority.DATA,  # see `_COMMON` of the settings
+            congestion_control=zenoh.CongestionControl.BLOCK
+            if waits
+            else zenoh.CongestionControl.DROP,
+            priority=priority,
         )
         self._declarations.append(publisher)
         put: Callable[[bytes], None] = publisher.put

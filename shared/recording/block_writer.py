@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Sequence
-from typing import Any, Final, NamedTuple
+from operator import itemgetter
+from typing import Any, Final
 
+from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import MessageIndex
 from mcap.writer import Writer
@@ -18,14 +20,8 @@ _HEAD: Final = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, lo
 _FIELDS: Final = 22  # bytes of it behind the length
 
 
-class RecordedMessage(NamedTuple):
-    """A message of a channel; times in ns."""
-
-    channel: int
-    log_time: int
-    publish_time: int
-    sequence: int
-    payload: bytes
+# A message: channel, log time and publish time in ns, sequence, payload.
+RecordedMessage = tuple[int, int, int, int, bytes]
 
 
 class BlockWriter(Writer):  # type: ignore[misc]  # the library has no types
@@ -36,18 +32,18 @@ class BlockWriter(Writer):  # type: ignore[misc]  # the library has no types
         builder: Any = self._Writer__chunk_builder
         statistics: Any = self._Writer__statistics
         indices, counts = builder.message_indices, statistics.channel_message_counts
-        parts, at = list[bytes](), builder.count
+        parts, at, pack = list[bytes](), builder.count, _HEAD.pack
         for channel, log_time, publish_time, sequence, payload in messages:
             size = _FIELDS + len(payload)
-            head = _HEAD.pack(Opcode.MESSAGE, size, channel, sequence, log_time, publish_time)
-            parts += (head, payload)
+            parts.append(pack(Opcode.MESSAGE, size, channel, sequence, log_time, publish_time))
+            parts.append(payload)
             index = indices.get(channel)
             if index is None:
-                index = indices[channel] = MessageIndex(channel_id=channel, records=[])
+                index = indices[channel] = _Index(channel, [])
             index.records.append((log_time, at))
             counts[channel] += 1
             at += _HEAD.size + len(payload)
-        first, last = min(m.log_time for m in messages), max(m.log_time for m in messages)
+        first, last = min(messages, key=_log_time)[1], max(messages, key=_log_time)[1]
         for of, count in ((builder, builder.num_messages), (statistics, statistics.message_count)):
             of.message_start_time = min(first, of.message_start_time) if count else first
             of.message_end_time = max(last, of.message_end_time)
@@ -55,3 +51,18 @@ class BlockWriter(Writer):  # type: ignore[misc]  # the library has no types
         statistics.message_count += len(messages)
         builder.record_writer.write(b"".join(parts))
         self._Writer__maybe_finalize_chunk()
+
+
+_log_time: Final = itemgetter(1)
+
+
+class _Index(MessageIndex):  # type: ignore[misc]
+    """Written at once: the library takes two calls for each number."""
+
+    def write(self, stream: RecordBuilder) -> None:
+        numbers = [number for record in self.records for number in record]
+        stream.start_record(Opcode.MESSAGE_INDEX)
+        stream.write2(self.channel_id)
+        stream.write4(8 * len(numbers))
+        stream.write(struct.pack(f"<{len(numbers)}Q", *numbers))
+        stream.finish_record()

@@ -17,6 +17,7 @@ from mcap.writer import CompressionType
 
 from quadriga.shared.codec import envelope
 from quadriga.shared.errors import RecordingError, name_file_errors
+from quadriga.shared.link.ticks import LinkMessage
 from quadriga.shared.recording.block_writer import BlockWriter, RecordedMessage
 from quadriga.shared.recording.metadata import CHANNELS, COUNTS, LOST, PROFILE, seal
 from quadriga.shared.recording.quota import OVERSIZED, REFUSED, Quota
@@ -112,30 +113,35 @@ class RecordingWriter:
         if len(payload) > self.quota.largest:
             self.quota.refused[OVERSIZED] += 1
             return
-        tick, publish_time = envelope(payload) or (-1, log_time_ns)
-        self._write([(key, tick, publish_time, log_time_ns, payload)])
-
-    def write_all(self, messages: Iterable[tuple[str, int, int, bytes]]) -> None:
-        """Append messages of a plant link: key, tick, log time, payload."""
-        self._write((key, tick, 1_000_000 * tick, at, sent) for key, tick, at, sent in messages)
-
-    def _write(self, messages: Iterable[tuple[str, int, int, int, bytes]]) -> None:
-        """Append messages: key, tick, publish time, log time, payload."""
-        added = list[RecordedMessage]()
-        for key, tick, publish_time, log_time, payload in messages:
-            row = self._channels.get(key)
-            if row is None:
-                if not self.quota.admits(key, len(self._channels)):
-                    self.quota.refused[REFUSED] += 1
-                    continue
-                row = self._channels[key] = self._channel(key)
+        if (row := self._admitted(key)) is not None:
             channel, track = row
-            added.append(RecordedMessage(channel, log_time, publish_time, track.count, payload))
-            self._open += MESSAGE_SIZE + len(payload)
+            tick, publish_time = envelope(payload) or (-1, log_time_ns)
+            self._mcap.add_message(channel, log_time_ns, payload, publish_time, track.count)
             track.note(tick)
+            self._open += MESSAGE_SIZE + len(payload)
+            self.messages += 1
+
+    def write_all(self, messages: Iterable[LinkMessage]) -> None:
+        """Append messages of a plant link."""
+        added, size = list[RecordedMessage](), 0
+        for log_ns, _, _, key, tick, payload in messages:
+            if (row := self._channels.get(key) or self._admitted(key)) is not None:
+                channel, track = row
+                added.append((channel, log_ns, 1_000_000 * tick, track.count, payload))
+                size += MESSAGE_SIZE + len(payload)
+                track.note(tick)
         if added:
             self._mcap.add_messages(added)
+        self._open += size
         self.messages += len(added)
+
+    def _admitted(self, key: str) -> tuple[int, TickTrack] | None:
+        """Channel and ticks of a key; None, and a message more refused, if there is no room."""
+        row = self._channels.get(key)
+        if row is None and self.quota.admits(key, len(self._channels)):
+            row = self._channels[key] = self._channel(key)
+        self.quota.refused[REFUSED] += row is None
+        return row
 
     def note(self, name: str, values: Mapping[str, str]) -> None:
         """Write down something about the recording, see `Recording.notes`."""
