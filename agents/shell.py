@@ -256,7 +256,7 @@ class AgentShell:
             ProcessError: always.
         """
         config, robot, tick = self._config, self._agent.robot, 0
-        batch = TickBatch((robot,), len(self._lately) + 1)
+        batch = TickBatch((robot,))
         for at, tick, state, command in self._lately:
             batch.add_state(robot, tick, np.frombuffer(state), at)
             batch.add_command(robot, tick, np.frombuffer(command), at)

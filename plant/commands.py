@@ -92,7 +92,7 @@ class CommandBox:
                 differ = f"command: got two of tick {command.tick} for {robot}, expected one"
                 self.refuse(robot, f"{differ} (does someone else command it?)")
             return False
-        first = max(oldest, self.tick_of(robot) + 1)
+        first = max(oldest, 0 if known is None else known.tick + 1)
         if not first <= command.tick <= tick:
             wanted = f"{first} … {tick}" if first < tick else f"{first}"
             self.refused[robot] = f"command.tick: got {command.tick}, expected {wanted}"

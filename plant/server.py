@@ -31,7 +31,6 @@ from quadriga.shared.messages import (
     Message,
     Reset,
     SafeStop,
-    State,
     Status,
     format_event,
 )
@@ -75,8 +74,7 @@ class PlantServer:
         self._stop = ""  # why somebody has asked the team to stop, and the walk to end
         # What is said may come twice; a release may end no stop that was pressed meanwhile.
         self._heard: dict[type[Message], Message] = {}
-        self._batch = TickBatch(plant.names, TICKS_MS)
-        self._taken = list[tuple[str, Command, int]]()  # and when, not in the batch yet
+        self._batch = TickBatch(plant.names)
         self._put_ticks = bus.publisher(TICKS.key(team, plant_name(robot)), waits=not realtime)
         self._put_truth = bus.publisher(TRUTH.key(team), waits=not realtime)
         self._put_clock = bus.publisher(CLOCK.key(team), waits=not realtime)
@@ -108,7 +106,8 @@ class PlantServer:
         for name, state in states.items():
             self.link.send(name, state)
         self._published, now = tick, log_ns()
-        self._gather(states, now)
+        for name, state in states.items():
+            self._batch.add_state(name, tick, state.row, now)
         for packet in self.bus.drain():
             self.time.take(*packet, tick)
         if self.time.drives and tick % self._periods[CLOCK.name] == 0:
@@ -117,23 +116,13 @@ class PlantServer:
             truth = plant.truth()
             if truth is not None:
                 self._put_truth(encode(truth))
-        if tick % TICKS_MS == 0 or self._batch.is_full:
+        if tick % TICKS_MS == 0:
             self.publish_batch()
         plant.settle()
 
-    def _gather(self, states: Mapping[str, State], now: int) -> None:
-        """Put what was taken in, and states that were sent now, into the batch."""
-        for name, command, at in self._taken:
-            self._batch.add_command(name, command.tick, command.row, at)
-        self._taken.clear()
-        for name, state in states.items():
-            self._batch.add_state(name, state.tick, state.row, now)
-
     def publish_batch(self) -> None:
         """Tell who records or looks on what has gone over the link since the last time."""
-        self._gather({}, 0)
-        batch = self._batch.take(self.plant.tick)
-        if batch is not None:
+        if (batch := self._batch.take(self.plant.tick)) is not None:
             self._put_ticks(encode(batch))
 
     def receive(self, robot: str, oldest: int, *, wait: bool) -> int:
@@ -157,7 +146,7 @@ class PlantServer:
         command = Command.from_row(got.tick, got.stamp_ns, got.command.copy())
         if not box.take(robot, command, self._published, oldest):
             return REFUSED
-        self._taken.append((robot, command, log_ns()))
+        self._batch.add_command(robot, got.tick, command.row, log_ns())
         return NEWER
 
     def check_link(self) -> None:

@@ -58,8 +58,10 @@ class LocalConnection:
         self._link, self._send, self._receive = link, link.send, link.recv_into
 
     def send(self, packet: bytes | memoryview) -> None:
-        with suppress(OSError):
+        try:  # half the time of `suppress`
             self._send(packet, _NOW)
+        except OSError:
+            return
 
     def receive(self, into: memoryview, *, wait: bool) -> int:
         try:

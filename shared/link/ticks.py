@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from quadriga.shared.codec import MAX_INTEGER, MAX_TICK, decode, encode_rows
+from quadriga.shared.codec import MAX_TICK, decode, encode_rows
 from quadriga.shared.errors import MessageError
 from quadriga.shared.link.packets import COMMAND_SIZE, STATE_SIZE
 from quadriga.shared.members import SIM, plant_name
@@ -17,7 +17,6 @@ from quadriga.shared.topics import COMMAND, STATE, Topic
 
 _BEFORE: Final = 3  # numbers in front of a row: the robot, its tick, and when
 _LONGEST_NS: Final = 10**15  # of a batch: it is sent after some ms
-_PER_TICK: Final = 4  # rows of a robot in a tick that there is room for; more are sent at once
 
 
 class LinkMessage(NamedTuple):
@@ -41,71 +40,45 @@ class LinkMessage(NamedTuple):
 
 
 class TickBatch:
-    """Rows that are gathered until they are sent.
+    """Rows that are gathered until they are sent. They are kept, not copied.
 
     Args:
         robots: whose they are.
-        ticks: for how many there is room.
     """
 
-    def __init__(self, robots: Sequence[str], ticks: int) -> None:
+    def __init__(self, robots: Sequence[str]) -> None:
         self._robots = tuple(robots)
         self._place = {name: place for place, name in enumerate(robots)}
-        room = _PER_TICK * len(robots) * ticks
-        self._states, self._commands = _RowBuffer(room, STATE_SIZE), _RowBuffer(room, COMMAND_SIZE)
+        self._states, self._commands = list[_Item](), list[_Item]()
 
     def add_state(self, robot: str, tick: int, row: Array, at: int) -> None:
         """Gather a state that was sent at a time of `clock.log_ns`."""
-        self._states.add((self._place[robot], tick, at), row)
+        self._states.append((self._place[robot], tick, at, row))
 
     def add_command(self, robot: str, tick: int, row: Array, at: int) -> None:
         """Gather a command that was taken in then."""
-        self._commands.add((self._place[robot], tick, at), row)
-
-    @property
-    def is_full(self) -> bool:
-        """Whether there may be no room for another tick."""
-        n = len(self._robots)
-        return self._states.room < n or self._commands.room < _PER_TICK * n
+        self._commands.append((self._place[robot], tick, at, row))
 
     def take(self, tick: int) -> Ticks | None:
-        """All that was gathered, as a message; None of nothing."""
-        begun = min(self._states.begun, self._commands.begun)
-        states, commands = self._states.take(begun), self._commands.take(begun)
-        if not (len(states) or len(commands)):
+        """All that was gathered, as a message, oldest first; None of nothing."""
+        firsts = [items[0][2] for items in (self._states, self._commands) if items]
+        if not firsts:
             return None
-        return Ticks(tick, tick * 1_000_000, begun, self._robots, states, commands)
+        begun = min(firsts)
+        rows = _rows(self._states, begun, STATE_SIZE), _rows(self._commands, begun, COMMAND_SIZE)
+        self._states, self._commands = [], []
+        return Ticks(tick, tick * 1_000_000, begun, self._robots, *rows)
 
 
-class _RowBuffer:
-    """Rows of numbers, what stands before each apart until all are taken."""
+_Item = tuple[int, int, int, Array]  # place of the robot, tick, when, row
 
-    def __init__(self, most: int, size: int) -> None:
-        self._rows = np.empty((most, _BEFORE + size))
-        self._heads = list[tuple[int, int, int]]()
 
-    @property
-    def room(self) -> int:
-        return len(self._rows) - len(self._heads)
-
-    @property
-    def begun(self) -> int:
-        """When the first was; no time of `clock.log_ns` is as late as that of none."""
-        return self._heads[0][2] if self._heads else MAX_INTEGER - 1
-
-    def add(self, head: tuple[int, int, int], row: Array) -> None:
-        if not self.room:  # of an agent that answers much at once
-            self._rows = np.concatenate([self._rows, np.empty_like(self._rows)])
-        self._rows[len(self._heads), _BEFORE:] = row
-        self._heads.append(head)
-
-    def take(self, begun: int) -> Array:
-        """Those that were added, of which nothing is left: the next ones take their place."""
-        rows = self._rows[: len(self._heads)]
-        if self._heads:
-            rows[:, :_BEFORE] = [(place, tick, at - begun) for place, tick, at in self._heads]
-            self._heads.clear()
-        return rows
+def _rows(items: Sequence[_Item], begun: int, size: int) -> Array:
+    rows = np.empty((len(items), _BEFORE + size))
+    if items:
+        rows[:, :_BEFORE] = [(place, tick, at - begun) for place, tick, at, _ in items]
+        rows[:, _BEFORE:] = [row for *_, row in items]
+    return rows
 
 
 def gathered(key: str, payload: bytes) -> list[LinkMessage]:

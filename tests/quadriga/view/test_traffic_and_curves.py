@@ -14,7 +14,6 @@ from quadriga.shared.config.sections import Config
 from quadriga.shared.link.packets import COMMAND_SIZE, STATE_SIZE
 from quadriga.shared.link.ticks import TickBatch
 from quadriga.shared.recording.reader import Recording
-from quadriga.shared.topics import TICKS_MS
 from quadriga.view.curves import SAMPLES, CurveWindow, axis_range, ticks_before
 from quadriga.view.live import _Feed
 from quadriga.view.readings import read_outputs
@@ -43,7 +42,7 @@ class TicksBus:
 
     def __init__(self) -> None:
         self.said: list[tuple[int, str, bytes]] = []
-        self.batch = TickBatch(("r1", "r2"), TICKS_MS)
+        self.batch = TickBatch(("r1", "r2"))
 
     def say(self, ticks: range) -> None:
         """States of r1 and commands that it gave, of each other tick."""

@@ -115,7 +115,7 @@ def test_a_recording_plays_and_pauses() -> None:
 def traffic(config: Config, before: int) -> Iterator[tuple[str, Message]]:
     """What a team sends before a tick; states and commands in batches of ticks."""
     sent = takewhile(lambda packet: packet[1].tick < before, packets(config, 0.3))
-    batch = TickBatch(robot_names(config.team.robots), TICKS_MS)
+    batch = TickBatch(robot_names(config.team.robots))
     for turn, several in groupby(sent, lambda packet: packet[1].tick // TICKS_MS):
         for key, message in several:
             robot = key.split("/")[1]

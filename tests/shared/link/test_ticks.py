@@ -30,7 +30,7 @@ rows = st.lists(
 
 @given(rows)
 def test_what_was_gathered_comes_back(items: list[tuple[str, int, bool, Array]]) -> None:
-    batch, sent = TickBatch(ROBOTS, 1), []
+    batch, sent = TickBatch(ROBOTS), []
     for place, (robot, tick, is_state, row) in enumerate(items):
         at = BEGUN + 123_457 * place
         if is_state:
@@ -51,16 +51,13 @@ def test_what_was_gathered_comes_back(items: list[tuple[str, int, bool, Array]])
     assert [item.log_ns for item in came] == [BEGUN + 123_457 * k for k in range(len(items))]
 
 
-def test_more_than_there_is_room_for_is_kept() -> None:
-    batch = TickBatch(("r1",), 1)
+def test_all_that_an_agent_answers_at_once_is_kept() -> None:
+    batch = TickBatch(("r1",))
     for tick in range(100):
         batch.add_command("r1", tick, np.full(COMMAND_SIZE, tick), BEGUN)
     message = batch.take(0)
     assert message is not None
     assert [item.tick for item in gathered("team/sim/ticks", encode(message))] == list(range(100))
-    assert not batch.is_full
-    batch.add_state("r1", 0, np.zeros(STATE_SIZE), BEGUN)
-    assert not batch.is_full
 
 
 @pytest.mark.parametrize(
@@ -88,7 +85,7 @@ def test_who_speaks_for_one_robot_is_not_believed_of_another() -> None:
         *(("r1", "r1", 1), ("plant_r1", "r1", 1), ("sim", "r2", 1)),
         *(("r1", "r2", 0), ("plant_r1", "r2", 0), ("sims", "r1", 0)),
     ):
-        batch = TickBatch((robot,), 1)
+        batch = TickBatch((robot,))
         batch.add_state(robot, 3, np.zeros(STATE_SIZE), BEGUN)
         message = batch.take(3)
         assert message is not None
