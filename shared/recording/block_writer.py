@@ -1,14 +1,13 @@
 """The MCAP library's writer, with many messages at once.
 
 The library takes 5 µs to add one, most of it for many small writes and calls: a quarter of all that
-a recorder of 6,000 a second does. Chunks, index and summary stay the library's.
+a recorder of 6,000 a second does. Chunks and summary stay the library's.
 """
 
 from __future__ import annotations
 
 import struct
 from collections.abc import Sequence
-from operator import itemgetter
 from typing import Any, Final
 
 from mcap.data_stream import RecordBuilder
@@ -18,7 +17,6 @@ from mcap.writer import Writer
 
 _HEAD: Final = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log, publish
 _FIELDS: Final = 22  # bytes of it behind the length
-
 
 # A message: channel, log time and publish time in ns, sequence, payload.
 RecordedMessage = tuple[int, int, int, int, bytes]
@@ -43,7 +41,8 @@ class BlockWriter(Writer):  # type: ignore[misc]  # the library has no types
             index.records.append((log_time, at))
             counts[channel] += 1
             at += _HEAD.size + len(payload)
-        first, last = min(messages, key=_log_time)[1], max(messages, key=_log_time)[1]
+        times = [log_time for _, log_time, *_ in messages]
+        first, last = min(times), max(times)
         for of, count in ((builder, builder.num_messages), (statistics, statistics.message_count)):
             of.message_start_time = min(first, of.message_start_time) if count else first
             of.message_end_time = max(last, of.message_end_time)
@@ -51,9 +50,6 @@ class BlockWriter(Writer):  # type: ignore[misc]  # the library has no types
         statistics.message_count += len(messages)
         builder.record_writer.write(b"".join(parts))
         self._Writer__maybe_finalize_chunk()
-
-
-_log_time: Final = itemgetter(1)
 
 
 class _Index(MessageIndex):  # type: ignore[misc]
