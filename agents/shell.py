@@ -116,9 +116,7 @@ class AgentShell:
             for topic in (MEASUREMENT, PLAN, STATUS, INPUTS, TICKS)
         }
         event = AGENT_EVENT.key(team, agent.robot)
-        self._put[AGENT_EVENT] = (
-            bus.publisher(event) if self._lockstep else bus.urgent_publisher(event)
-        )
+        self._put[AGENT_EVENT] = bus.publisher(event, urgent=not self._lockstep)
         self._telemetry = Telemetry(config.estimator.kind, paced=not self._lockstep)
         self._given_up: dict[Source, int] = {}  # messages received of a source when given up
         self._plain = PlainTicks(agent) if isinstance(agent, Agent) else None
