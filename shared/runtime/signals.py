@@ -47,8 +47,8 @@ def stop_on_signals() -> StopFlag:
 
 @contextmanager
 def _handled(handle: Callable[[int, FrameType | None], object]) -> Iterator[None]:
-    """Within the block `handle` is called with SIGINT and SIGTERM, which reach the main thread."""
-    before = {number: signal.signal(number, handle) for number in _STOPS}
+    """Within the block `handle` is called with SIGINT and SIGTERM, if this is the main thread."""
+    before = {number: signal.signal(number, handle) for number in _STOPS if _is_main_thread()}
     try:
         yield
     finally:
@@ -64,10 +64,7 @@ def _is_main_thread() -> bool:
 def stop_flag() -> Iterator[StopFlag]:
     """A flag that SIGINT and SIGTERM set within the block; never that of another thread."""
     flag = StopFlag()
-    if _is_main_thread():
-        with _handled(flag.set):
-            yield flag
-    else:
+    with _handled(flag.set):
         yield flag
 
 
