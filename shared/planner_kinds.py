@@ -136,11 +136,9 @@ def load_builder(kind: PlannerKind, reference: str) -> Any:
 
 
 def read_options(kind: PlannerKind, text: str) -> dict[str, float]:
-    """The options of a kind: its defaults, and what `planner.options` says instead.
+    """The options of a kind: its defaults, and what the text of `planner.options` says instead.
 
-    Args:
-        kind: whose options these are.
-        text: pairs name=number, separated by spaces.
+    The text has pairs name=number, separated by spaces.
 
     Raises:
         ConfigError: an option that the kind does not have, one twice, or no finite number.

@@ -9,11 +9,7 @@ QUANTILES: Final = {"median": 0.5, "p99": 0.99}
 
 
 class Histogram:
-    """Counts values ≥ 0; its quantiles are exact to a bin's width.
-
-    Args:
-        width: of a bin, in the values' unit.
-    """
+    """Counts values ≥ 0; its quantiles are exact to a bin's width, which has their unit."""
 
     def __init__(self, width: float) -> None:
         self._width, self._max = width, 0.0

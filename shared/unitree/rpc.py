@@ -66,10 +66,7 @@ class RpcMessage(NamedTuple):
 class RpcEnd:
     """One end of a service: it sends messages of one kind and receives those of the other.
 
-    Args:
-        participant: of the domain.
-        service: its name, an attribute too.
-        serves: whether this is the end that responds.
+    The end that `serves` responds.
     """
 
     def __init__(self, participant: DdsParticipant, service: str, *, serves: bool) -> None:
