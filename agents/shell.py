@@ -162,7 +162,7 @@ class AgentShell:
 
     def _take_mail(self, timeout: float = 0.0) -> None:
         """Take in all that has come over the bus, or comes within `timeout` seconds."""
-        first = self._bus.get(timeout) if timeout or self._bus.has_mail else None
+        first = self._bus.get(timeout)
         if first is not None:
             self._inbox.take(*first)
             for packet in self._bus.drain():

@@ -207,11 +207,6 @@ class Bus:
         self._hear(key, _direct(lambda sample: call(sample.payload.to_bytes())))
 
     @property
-    def has_mail(self) -> bool:
-        """Whether there is anything in the inbox."""
-        return self._inbox.has_items
-
-    @property
     def dropped(self) -> int:
         """Packets that were dropped so far because this process did not take them in."""
         return self._inbox.dropped

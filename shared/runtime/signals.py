@@ -9,7 +9,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from types import FrameType
 from typing import Final
 
@@ -80,12 +80,7 @@ def interruptible(stopped: Callable[[], bool]) -> Iterator[None]:
     Raises:
         KeyboardInterrupt: the process is to stop, or was to before the block.
     """
-    if stopped():
-        raise KeyboardInterrupt
-    if not isinstance(stopped, StopFlag):
-        yield
-        return
-    with _handled(_interrupt):
+    with _handled(_interrupt) if isinstance(stopped, StopFlag) else nullcontext():
         if stopped():
             raise KeyboardInterrupt
         yield
