@@ -116,9 +116,7 @@ class AgentShell:
             for topic in (MEASUREMENT, PLAN, STATUS, INPUTS, TICKS)
         }
         event = AGENT_EVENT.key(team, agent.robot)
-        self._put[AGENT_EVENT] = (
-            bus.publisher(event) if self._lockstep else bus.urgent_publisher(event)
-        )
+        self._put[AGENT_EVENT] = bus.publisher(event, urgent=not self._lockstep)
         self._telemetry = Telemetry(config.estimator.kind, paced=not self._lockstep)
         self._given_up: dict[Source, int] = {}  # messages received of a source when given up
         self._plain = PlainTicks(agent) if isinstance(agent, Agent) else None
@@ -164,7 +162,7 @@ class AgentShell:
 
     def _take_mail(self, timeout: float = 0.0) -> None:
         """Take in all that has come over the bus, or comes within `timeout` seconds."""
-        first = self._bus.get(timeout) if timeout or self._bus.has_mail else None
+        first = self._bus.get(timeout)
         if first is not None:
             self._inbox.take(*first)
             for packet in self._bus.drain():

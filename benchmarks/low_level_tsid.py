@@ -93,7 +93,7 @@ def _compare(config: Config, cases: list[TsidCase]) -> dict[str, Any] | None:
     }
 
 
-_TORQUE_BOUNDS: Final = A1.torque_bounds
+_TORQUE_BOUNDS: Final = np.stack([-A1.torque_limit, A1.torque_limit])
 
 
 class _Ours:

@@ -82,7 +82,7 @@ class PlantServer:
         # The last one has all leave: in lock-step it comes after all else. In real time events wait
         # for nobody, and are not what gets lost when somebody is slow.
         event = EVENT.key(team)
-        self._put_event = bus.urgent_publisher(event) if realtime else bus.publisher(event)
+        self._put_event = bus.publisher(event, urgent=realtime)
         self._periods = periods(config)
         self._last_tick = round(config.world.duration * 1000)
         self._fallen: set[str] = set()

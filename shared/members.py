@@ -22,6 +22,7 @@ ESTOP: Final = "estop"  # stops the team once
 STOP: Final = "stop"  # has the team slow down and stand, once
 RESET: Final = "reset"  # releases an emergency stop, once
 RESUME: Final = "resume"  # has a team that stands go on, once
+SPEAKERS: Final = (ESTOP, STOP, RESET, RESUME)  # they see what comes of their word
 DOCTOR: Final = "doctor"  # asks everybody how they are
 OBSERVER: Final = "observer"  # whoever looks on: `echo`, `hz`
 

@@ -104,10 +104,8 @@ def resolve_stops(mode: Mode, tick: int, stops: Sequence[Stop]) -> Mode:
     An emergency stop outranks a fault, and the first reason of either stays. What somebody has
     asked for takes the place of a loss, after which a robot may go on by itself.
 
-    Args:
-        mode: of the normal course, see `next_mode`.
-        tick: the present one.
-        stops: in the order in which they came up.
+    The mode is that of the normal course, see `next_mode`; stops are in the order in which they
+    came up.
     """
     if not stops:
         return mode

@@ -7,7 +7,6 @@ that whoever only reads a configuration imports no planner.
 
 from __future__ import annotations
 
-import hashlib
 import math
 from collections.abc import Mapping
 from contextlib import suppress
@@ -20,6 +19,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from quadriga.shared.errors import ConfigError, did_you_mean
+from quadriga.shared.runtime.installed import digest_files
 
 GROUP: Final = "quadriga.planners"
 NO_PLANNER: Final = "none"  # the kind without plans
@@ -136,11 +136,9 @@ def load_builder(kind: PlannerKind, reference: str) -> Any:
 
 
 def read_options(kind: PlannerKind, text: str) -> dict[str, float]:
-    """The options of a kind: its defaults, and what `planner.options` says instead.
+    """The options of a kind: its defaults, and what the text of `planner.options` says instead.
 
-    Args:
-        kind: whose options these are.
-        text: pairs name=number, separated by spaces.
+    The text has pairs name=number, separated by spaces.
 
     Raises:
         ConfigError: an option that the kind does not have, one twice, or no finite number.
@@ -176,11 +174,8 @@ def plugin_origin(name: str) -> str:
     kind, entry = find_kind(name), _find_entry(name)
     references = filter(None, (entry.value, kind.build, kind.build_team))
     tops = {reference.partition(":")[0].partition(".")[0] for reference in references}
-    digest = hashlib.sha256()
-    for top in sorted(tops - {"quadriga"}):
-        for path, shown in _files_of(top):
-            digest.update(f"\0{shown}\0".encode() + path.read_bytes())
-    return f"{_distribution_of(entry)} {digest.hexdigest()[:16]}"
+    files = (file for top in sorted(tops - {"quadriga"}) for file in _files_of(top))
+    return f"{_distribution_of(entry)} {digest_files(files)}"
 
 
 @cache
@@ -222,15 +217,15 @@ def _import_error(name: str, reference: str, error: Exception) -> ConfigError:
     return ConfigError(_KEY, got, "a planner that can be imported", cause)
 
 
-def _files_of(top: str) -> list[tuple[Path, str]]:
-    """Every file of a top-level package or module, and its path within it, in a fixed order."""
+def _files_of(top: str) -> list[tuple[str, Path]]:
+    """Every file of a top-level package or module by its path within it, in a fixed order."""
     spec = find_spec(top)
     if spec is None:
         return []
     if spec.submodule_search_locations is None:
-        return [(Path(str(spec.origin)), "")]
+        return [("", Path(str(spec.origin)))]
     return [
-        (path, path.relative_to(folder).as_posix())
+        (path.relative_to(folder).as_posix(), path)
         for folder in map(Path, spec.submodule_search_locations)
         for path in sorted(folder.rglob("*"))
         if path.is_file() and "__pycache__" not in path.parts

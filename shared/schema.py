@@ -69,7 +69,7 @@ def json_schema(kind: type[Message]) -> dict[str, Any]:
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": f"quadriga.{kind.__name__}",
-        "description": _summary(kind),
+        "description": (kind.__doc__ or "").partition("\n")[0],
         "type": "object",
         "properties": properties,
         "required": list(properties),
@@ -95,7 +95,7 @@ def _row(topic: Topic) -> Iterator[str]:
 
 
 def _section(kind: type[Message]) -> str:
-    lines = ["", f"## {kind.__name__}", "", _summary(kind), ""]
+    lines = ["", f"## {kind.__name__}", "", (kind.__doc__ or "").partition("\n")[0], ""]
     own = [item for item in fields(kind) if item.name not in ("tick", "stamp_ns")]
     if own:
         lines += ["| field | shape | unit | frame, or meaning |", "|---|---|---|---|"]
@@ -107,10 +107,6 @@ def _section(kind: type[Message]) -> str:
         else:
             lines.append(f"| `{item.name}` | {meta['kind'].__name__} | | {meta['doc']} |")
     return "\n".join(lines) + "\n"
-
-
-def _summary(kind: type[Message]) -> str:
-    return (kind.__doc__ or "").strip().splitlines()[0]
 
 
 if __name__ == "__main__":

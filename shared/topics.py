@@ -8,7 +8,7 @@ from typing import Final
 from quadriga.shared import members
 from quadriga.shared import messages as msg
 from quadriga.shared.errors import MessageError
-from quadriga.shared.members import AGENT, LAUNCHER, OPERATOR, PLANNER, SIM
+from quadriga.shared.members import AGENT, LAUNCHER, OPERATOR, PLANNER, SIM, SPEAKERS
 
 CONFIGURED: Final = -1  # a time that the configuration says: see `quadriga.shared.config.timing`
 SAMPLE_MS: Final = 10  # one sample of u and y: forces are means over it, outputs taken at its end
@@ -19,8 +19,6 @@ STATUS_MS: Final = 100  # so often an agent gives account of itself in lock-step
 RECEIVED: Final = "received"  # ends the key of the question whether all before it has arrived
 
 _PLANS: Final = (AGENT, PLANNER)  # who plans
-# Processes that say one word to a team, and see what comes of it.
-_SPEAKERS: Final = (members.ESTOP, members.STOP, members.RESET, members.RESUME)
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +73,7 @@ PLAN: Final = Topic(
     per_robot=True, period_ms=CONFIGURED, max_age_ms=CONFIGURED,
 )  # fmt: skip
 STATUS: Final = Topic(
-    "status", msg.Status, (*_PLANS, SIM), (AGENT, OPERATOR, LAUNCHER, *_SPEAKERS),
+    "status", msg.Status, (*_PLANS, SIM), (AGENT, OPERATOR, LAUNCHER, *SPEAKERS),
     per_robot=True, period_ms=CONFIGURED, max_age_ms=1000, repeats=True,
 )  # fmt: skip
 INPUTS: Final = Topic("inputs", msg.Consumed, (AGENT,), (), per_robot=True, period_ms=0)
@@ -98,7 +96,7 @@ REQUESTS: Final = (ESTOP, STOP, RESET, RESUME)  # of people, who may not know th
 LIVE_FAULT: Final = Topic("fault", msg.LiveFault, (LAUNCHER,), (SIM,), period_ms=0, repeats=True)
 TRUTH: Final = Topic("sim/truth", msg.Truth, (SIM,), (AGENT, LAUNCHER), period_ms=CONFIGURED)
 EVENT: Final = Topic(
-    "sim/event", msg.Event, (SIM,), (*_PLANS, OPERATOR, LAUNCHER, *_SPEAKERS, SIM),
+    "sim/event", msg.Event, (SIM,), (*_PLANS, OPERATOR, LAUNCHER, *SPEAKERS, SIM),
     period_ms=0, repeats=True,
 )  # fmt: skip
 # What an agent tells of itself beside its status; never of the kind `stop`, which ends a walk.
@@ -110,7 +108,7 @@ AGENT_EVENT: Final = Topic(
 INJECTED: Final = Topic("injected", msg.Event, (LAUNCHER,), (), period_ms=0, repeats=True)
 # Not recorded: the states of every tick tell the same.
 CLOCK: Final = Topic(
-    "clock", msg.Clock, (SIM,), (OPERATOR, LAUNCHER, *_SPEAKERS, SIM),
+    "clock", msg.Clock, (SIM,), (OPERATOR, LAUNCHER, *SPEAKERS, SIM),
     period_ms=CLOCK_MS, recorded=False,
 )  # fmt: skip
 # What went over the plant links, by plants, and by agents whose plant is gone. Not recorded: each

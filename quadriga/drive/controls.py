@@ -58,7 +58,8 @@ class DriveControls:
         self._take_status = {name: bus.collect(STATUS.key(team, name)) for name in self.robots}
         self._take_event = bus.collect(EVENT.key(team))
         self._put = {
-            topic: bus.urgent_publisher(topic.key(team)) for topic in (ESTOP, STOP, RESET, RESUME)
+            topic: bus.publisher(topic.key(team), urgent=True)
+            for topic in (ESTOP, STOP, RESET, RESUME)
         }
 
     def leave(self, driver: str) -> None:

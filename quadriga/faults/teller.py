@@ -44,7 +44,7 @@ class FaultTeller:
         self.tick = 0
         self._bus, self._name, self._stage = bus, name, stage
         bus.subscribe(CLOCK.key(bus.team))
-        self._put = bus.urgent_publisher(INJECTED.key(bus.team))
+        self._put = bus.publisher(INJECTED.key(bus.team), urgent=True)
 
     def read_clock(self) -> int:
         """The newest tick of the team's clock, ms."""

@@ -21,6 +21,7 @@ import numpy as np
 from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.arithmetic import arithmetic_digest
 from quadriga.shared.runtime.atomic import write_text
+from quadriga.shared.runtime.installed import digest_files
 from quadriga.shared.runtime.jit_cache import followed_files
 from quadriga.shared.runtime.places import SOURCE, cache_dir
 
@@ -80,10 +81,8 @@ def numbers(*values: float | None) -> Array:
 @cache
 def sources_digest(module: str) -> str:
     """Digest of the text of a module and of all that it imports; 16 hexadecimal digits."""
-    digest = hashlib.sha256()
-    for path in followed_files(SOURCE, [module]):
-        digest.update(f"\0{path.relative_to(SOURCE)}\0".encode() + path.read_bytes())
-    return digest.hexdigest()[:16]
+    files = followed_files(SOURCE, [module])
+    return digest_files((path.relative_to(SOURCE), path) for path in files)
 
 
 def _origin(module: str) -> str:

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from quadriga.shared.config.load import layers
 from quadriga.shared.errors import ConfigError, did_you_mean, name_file_errors
-from quadriga.shared.runtime.places import scenario_folder
+from quadriga.shared.runtime.places import SCENARIOS
 
 LABEL: Final = "world.scenario"  # the key that carries a scenario's name
 _SUFFIX: Final = ".toml"
@@ -16,7 +16,7 @@ _SUFFIX: Final = ".toml"
 
 def names() -> tuple[str, ...]:
     """The scenarios there are, sorted."""
-    return tuple(sorted(file.stem for file in scenario_folder().glob(f"*{_SUFFIX}")))
+    return tuple(sorted(file.stem for file in SCENARIOS.glob(f"*{_SUFFIX}")))
 
 
 def path(name: str) -> Path:
@@ -37,7 +37,7 @@ def path(name: str) -> Path:
             "the name of a scenario, or a TOML file",
             did_you_mean(name, names()) or "`quadriga scenarios` lists them",
         )
-    return scenario_folder() / f"{name}{_SUFFIX}"
+    return SCENARIOS / f"{name}{_SUFFIX}"
 
 
 def label(name: str) -> str:

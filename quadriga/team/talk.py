@@ -76,7 +76,7 @@ class TeamTalk:
         link that is new or under load may lose it, and to those of the team who turn up later, as a
         recorder that has not found this process yet must not miss what agents have heard.
         """
-        put = self.bus.urgent_publisher(topic.key(self.bus.team))
+        put = self.bus.publisher(topic.key(self.bus.team), urgent=True)
 
         def say(message: Message) -> None:
             word = encode(message)

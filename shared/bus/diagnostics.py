@@ -68,10 +68,7 @@ def lead(config: Config) -> str:
 def clock_difference(ahead: float, error: float, limit: float) -> str:
     """How far a clock differs from another, in words; "" if by no more than `limit`, or not surely.
 
-    Args:
-        ahead: of the other, s.
-        error: by which that may be off, s.
-        limit: s.
+    It is `ahead` of the other, which may be off by `error`; all in s.
     """
     if abs(ahead) - error <= limit:
         return ""
@@ -113,22 +110,15 @@ class MemberAnswer:
 
 @dataclass(frozen=True, slots=True)
 class TeamView:
-    """What one process sees of a team at one moment.
+    """What one process sees of a team at one moment."""
 
-    Attributes:
-        linked: whether it is linked to anybody at all.
-        here: names of those that have announced themselves.
-        doubled: names that two processes carry.
-        names: all that the team should have.
-        answers: what was said, by name; processes of one name answer each.
-        lead: who drives the team's time, with which all must agree; None: it has said nothing.
-    """
-
-    linked: bool
-    here: frozenset[str]
-    doubled: frozenset[str]
-    names: frozenset[str]
+    linked: bool  # whether it is linked to anybody at all
+    here: frozenset[str]  # names of those that have announced themselves
+    doubled: frozenset[str]  # names that two processes carry
+    names: frozenset[str]  # all that the team should have
+    # What was said, by name; processes of one name answer each.
     answers: Mapping[str, Sequence[MemberAnswer]] = field(default_factory=dict)
+    # Who drives the team's time, with which all must agree; None: it has said nothing.
     lead: About | None = None
 
     @property

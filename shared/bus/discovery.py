@@ -55,11 +55,6 @@ def log(text: str) -> None:
 class ProcessInfo:
     """What this process answers from now on to whoever asks who it is, as it is at that moment.
 
-    Args:
-        bus: this process's.
-        config: the configuration that it has.
-        predictor_sha256: digest of the predictor that it has; "": none.
-
     Attributes:
         met: whether this process has seen that all are here.
         start_ns: when tick 0 begins by the system clock, of the plant that drives time for others.
@@ -85,7 +80,7 @@ class ProcessInfo:
 
 
 def describe_process(config: Config, name: str, predictor_sha256: str = "") -> About:
-    """What does not change of what a process says of itself."""
+    """What does not change of what a process says of itself; "" is the digest of no predictor."""
     return About(
         tick=0,
         stamp_ns=0,

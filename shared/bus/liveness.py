@@ -33,11 +33,9 @@ def find_lost_link(bus: Bus, config: Config) -> Loss | None:
 def find_loss(bus: Bus, config: Config) -> Loss | None:
     """What is gone at the moment of that on which a process depends; None if all is there."""
     link = find_lost_link(bus, config)
-    if link is not None:  # then everybody else seems to be gone, too
-        return link
-    if not has_lead(bus.members_at(HERE)):
-        return Loss(LEAD_GONE, f"process {lead(config)} of team {bus.team!r}, seen by {bus.name}")
-    return None
+    if link is not None or has_lead(bus.members_at(HERE)):
+        return link  # without it everybody else seems to be gone, too
+    return Loss(LEAD_GONE, f"process {lead(config)} of team {bus.team!r}, seen by {bus.name}")
 
 
 def loss_error(loss: Loss, tick: int) -> ProcessError:
@@ -54,10 +52,6 @@ class Liveness:
 
     The last packets of who drives time may arrive after its token has vanished, and they announce
     the end of the walk. So a loss counts after `LAST_PACKETS`.
-
-    Args:
-        bus: the process's own, in the midst of a walk.
-        config: the team's configuration.
     """
 
     def __init__(self, bus: Bus, config: Config) -> None:

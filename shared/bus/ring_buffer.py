@@ -46,17 +46,14 @@ class Mailbox(Generic[Item]):
         """The oldest item, waiting at most `timeout` seconds for one; None if none comes."""
         if self._items:
             return self._items.popleft()
+        if not timeout:
+            return None
         deadline = monotonic() + timeout
         # The lock may be free because of an item that was taken without waiting: then look again.
         while self._empty.acquire(timeout=max(0.0, deadline - monotonic())):
             if self._items:
                 return self._items.popleft()
         return None
-
-    @property
-    def has_items(self) -> bool:
-        """Whether an item is there."""
-        return bool(self._items)
 
     def drain(self) -> list[Item]:
         """All items that are there, oldest first, without waiting."""

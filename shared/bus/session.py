@@ -39,6 +39,7 @@ _INBOX: Final = 1 << 16  # packets that wait for a process at most, some seconds
 POLL: Final = 0.05  # s, longest wait before a loop looks at its stop flag
 _ACK_TIMEOUT: Final = 2.0  # s
 _LINK_TIMEOUT: Final = 5.0  # s
+_WAITS, _DROPS = zenoh.CongestionControl.BLOCK, zenoh.CongestionControl.DROP
 # A member receives in one thread: each message is handed over to Python, which one thread at a time
 # can do. Zenoh reads this when a process opens its first session.
 _THREADS: Final = "ZENOH_RUNTIME"
@@ -174,35 +175,35 @@ class Bus:
         while not (self.linked or stopped()) and monotonic() < deadline:
             pause()
 
-    def publisher(self, key: str, *, waits: bool = True) -> Callable[[bytes], None]:
+    def publisher(
+        self, key: str, *, waits: bool = True, urgent: bool = False
+    ) -> Callable[[bytes], None]:
         """A function that sends a payload on `key`.
 
         Args:
             key: the full key, `<team>/…`.
             waits: wait for whoever is slow, and keep everybody waiting with a router; else who is
                 slow misses some.
+            urgent: for what people say and what happens: it waits for nobody, overtakes all else.
+                So it gets through a router whose other queues are full since somebody is frozen.
         """
-        return self._publisher(key, waits, zenoh.Priority.DATA)
-
-    def urgent_publisher(self, key: str) -> Callable[[bytes], None]:
-        """Likewise, for what people say and what happens: it waits for nobody, overtakes all else.
-
-        So it gets through a router whose other queues are full since somebody is frozen.
-        """
-        return self._publisher(key, False, zenoh.Priority.REAL_TIME)
+        publisher = self._session.declare_publisher(
+            key,
+            express=urgent,  # see `_COMMON` of the settings
+            congestion_control=_WAITS if waits and not urgent else _DROPS,
+            priority=zenoh.Priority.REAL_TIME if urgent else zenoh.Priority.DATA,
+        )
+        self._declarations.append(publisher)
+        put: Callable[[bytes], None] = publisher.put
+        return put
 
     def subscribe(self, key: str) -> None:
         """Feed what others publish on `key` (may hold `*` and `**`) into the inbox."""
-        self._hear(key, self._inbox.put)
+        self._hear(key, _direct(self._inbox.put))
 
     def hear(self, key: str, call: Callable[[bytes], None]) -> None:
         """Have `call` take what others publish on `key`: in the receiving thread, quick."""
-        self._hear(key, lambda sample: call(sample.payload.to_bytes()))
-
-    @property
-    def has_mail(self) -> bool:
-        """Whether there is anything in the inbox."""
-        return self._inbox.has_items
+        self._hear(key, _direct(lambda sample: call(sample.payload.to_bytes())))
 
     @property
     def dropped(self) -> int:
@@ -216,7 +217,7 @@ class Bus:
         """
         kept: SimpleQueue[Arrival] = SimpleQueue()
         for key in keys:
-            self._hear(key, lambda sample: kept.put((monotonic_ns(), *_packet(sample))))
+            self._hear(key, _direct(lambda sample: kept.put((monotonic_ns(), *_packet(sample)))))
         return lambda: [kept.get_nowait() for _ in range(kept.qsize())]
 
     def keep_newest(self, key: str) -> Callable[[], bytes | None]:
@@ -225,7 +226,7 @@ class Bus:
         The function returned gives it once, None if nothing has come since. Zenoh keeps it, so that
         what nobody looks at costs this process nothing.
         """
-        kept = self._declare_subscriber(key, zenoh.handlers.RingChannel(1))
+        kept = self._hear(key, zenoh.handlers.RingChannel(1))
 
         def take() -> bytes | None:
             sample = kept.try_recv()
@@ -252,7 +253,7 @@ class Bus:
             timeout=timeout,
             consolidation=zenoh.ConsolidationMode.NONE,
             express=True,
-            congestion_control=zenoh.CongestionControl.DROP,  # who is frozen holds up nobody
+            congestion_control=_DROPS,  # who is frozen holds up nobody
         )
         return answers
 
@@ -337,25 +338,7 @@ class Bus:
         )
         return all(reply.ok is not None for reply in asked)
 
-    def _publisher(
-        self, key: str, waits: bool, priority: zenoh.Priority
-    ) -> Callable[[bytes], None]:
-        publisher = self._session.declare_publisher(
-            key,
-            express=priority is not zenoh.Priority.DATA,  # see `_COMMON` of the settings
-            congestion_control=zenoh.CongestionControl.BLOCK
-            if waits
-            else zenoh.CongestionControl.DROP,
-            priority=priority,
-        )
-        self._declarations.append(publisher)
-        put: Callable[[bytes], None] = publisher.put
-        return put
-
-    def _hear(self, key: str, call: Callable[[zenoh.Sample], object]) -> None:
-        self._declare_subscriber(key, _direct(call))
-
-    def _declare_subscriber(self, key: str, handler: Any) -> Any:
+    def _hear(self, key: str, handler: Any) -> Any:
         heard = self._session.declare_subscriber(key, handler, allowed_origin=zenoh.Locality.REMOTE)
         self._declarations.append(heard)
         return heard

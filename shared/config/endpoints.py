@@ -63,10 +63,7 @@ def check_port(name: str, endpoint: str) -> None:
 def check_exposure(bus: BusConfig, name: str, endpoint: str) -> None:
     """Refuse an endpoint at which others could command the robots.
 
-    Args:
-        bus: the configuration.
-        name: of the key or the option that has the endpoint.
-        endpoint: where a process listens or connects.
+    The name is that of the key or the option that has the endpoint.
 
     Raises:
         ConfigError: it is off the loopback without certificates, or has certificates in a way

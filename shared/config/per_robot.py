@@ -22,10 +22,7 @@ def carriers(text: str, names: tuple[str, ...]) -> tuple[float, ...]:
 def friction_of_robots(text: str, usual: float, names: tuple[str, ...]) -> tuple[float, ...]:
     """The friction coefficient that each robot of `names` finds under its feet.
 
-    Args:
-        text: of the key; empty: the usual one for all.
-        usual: that of all robots that the text does not name.
-        names: of the team's robots.
+    It is the `usual` one for all robots that the text does not name.
 
     Raises:
         ConfigError: as `carriers`, or a coefficient is not within the bounds of `world.friction`.

@@ -12,7 +12,7 @@ import numpy as np
 from quadriga.shared.config.sections import Config, ReferenceConfig
 from quadriga.shared.errors import ConfigError, name_file_errors
 from quadriga.shared.robots.conventions import Array
-from quadriga.shared.runtime.places import scenario_folder
+from quadriga.shared.runtime.places import SCENARIOS
 
 ROW_END: Final = ";"  # where a trace stands in a configuration, in one line
 _KEY: Final = "reference.trace"
@@ -22,17 +22,11 @@ _STREAM: Final = 6  # of the seed
 
 @dataclass(frozen=True, slots=True)
 class Trace:
-    """Samples of a velocity reference, linear in between.
+    """Samples of a velocity reference, linear in between."""
 
-    Attributes:
-        t: times from 0 to the trace's length, shape (m,), s.
-        v: vx, vy, wz, shape (m, 3), m/s and rad/s.
-        begin: time of the trace at which a walk begins, s.
-    """
-
-    t: Array
-    v: Array
-    begin: float = 0.0
+    t: Array  # times from 0 to the trace's length, shape (m,), s
+    v: Array  # vx, vy, wz, shape (m, 3), m/s and rad/s
+    begin: float = 0.0  # time of the trace at which a walk begins, s
 
     def at(self, seconds: float) -> tuple[float, float, float]:
         """The vx, vy, wz to walk with `seconds` after the first step."""
@@ -57,13 +51,12 @@ def trace_of(config: Config) -> Trace | None:
 def inline_trace(name: str) -> str:
     """A trace's file as one line, as `reference.trace` holds it: nothing then depends on the file.
 
-    Args:
-        name: a path with a `/`, or a file beside the scenarios.
+    The name is a path with a `/`, or that of a file beside the scenarios.
 
     Raises:
         ConfigError: the file cannot be read, or is no trace.
     """
-    path = Path(name) if "/" in name else scenario_folder() / name
+    path = Path(name) if "/" in name else SCENARIOS / name
     with name_file_errors(ConfigError, f"{_KEY} {path}", "a file that can be read"):
         text = path.read_text(encoding="utf-8-sig")  # as spreadsheets write it
     lines = ["".join(line.split()) for line in text.splitlines()]

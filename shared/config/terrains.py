@@ -10,23 +10,14 @@ from typing import Final
 
 @dataclass(frozen=True, slots=True)
 class TerrainKind:
-    """One row of the table.
+    """One row of the table."""
 
-    Attributes:
-        name: what `world.terrain` calls it.
-        builder: `module:function` of the package `quadriga.sim_server.terrain`; "" of a plane.
-        text: how events and reports describe it, keys of `[world]` in braces.
-        meaning: what neither its name nor its keys say.
-        height_key: the key of `[world]` that is its height; at 0 the ground is a plane.
-        least_height: the least that it may be, m.
-    """
-
-    name: str
-    builder: str
-    text: str
-    meaning: str = ""
-    height_key: str = "terrain_height"
-    least_height: float = 0.0
+    name: str  # what `world.terrain` calls it
+    builder: str  # `module:function` of the package `quadriga.sim_server.terrain`; "" of a plane
+    text: str  # how events and reports describe it, keys of `[world]` in braces
+    meaning: str = ""  # what neither its name nor its keys say
+    height_key: str = "terrain_height"  # of `[world]`; at 0 the ground is a plane
+    least_height: float = 0.0  # that it may be, m
 
 
 _H: Final = "up to {terrain_height:g} m"

@@ -31,7 +31,7 @@ def to_toml(config: Config, without: Container[str] = ()) -> str:
     """
     lines = ["# Configuration of quadriga. Every key may be left out: its default then holds."]
     for section, values in _sections(config):
-        lines += ["", f"# {_summary(values)}", f"[{section}]"]
+        lines += ["", "# " + values.__doc__.partition("\n")[0], f"[{section}]"]
         for item in fields(values):
             if f"{section}.{item.name}" not in without:
                 unit, limits = _unit(item.metadata), _limits(item.metadata)
@@ -51,7 +51,7 @@ def to_markdown(config: Config) -> str:
         "`quadriga config --markdown > docs/configuration.md`.",
     ]
     for section, values in _sections(config):
-        lines += ["", f"## `[{section}]`", "", _summary(values), ""]
+        lines += ["", f"## `[{section}]`", "", values.__doc__.partition("\n")[0], ""]
         lines += ["| key | default | unit | permitted | meaning |", "|---|---|---|---|---|"]
         for item in fields(values):
             meta, default = item.metadata, f"`{_toml(getattr(values, item.name))}`"
@@ -98,10 +98,6 @@ def departures(config: Config, usual: Config) -> Iterator[tuple[str, Any, Any, M
             value, other = (getattr(of, item.name) for of in (mine, getattr(usual, section)))
             if value != other:
                 yield f"{section}.{item.name}", value, other, item.metadata
-
-
-def _summary(section: Any) -> str:
-    return (section.__doc__ or "").strip().splitlines()[0]
 
 
 def _unit(meta: Mapping[str, Any]) -> str:

@@ -41,11 +41,6 @@ _AGAIN: Final = 0.5  # s, after which hello is said again over the bus
 class AgentEnd:
     """A robot's connection to its plant.
 
-    Args:
-        config: the team's configuration.
-        robot: the robot's name.
-        bus: the agent's.
-
     Attributes:
         received: what `receive` has received.
         command: the packet of the next command.

@@ -114,12 +114,7 @@ class BusConnection:
 
 
 def local_address(config: Config, plant: str) -> Path | None:
-    """The socket on which a plant listens; None if this user has no folder of their own.
-
-    Args:
-        config: the team's configuration.
-        plant: name of the process.
-    """
+    """The socket on which this plant listens; None if this user has no folder of their own."""
     folder, of = make_runtime_dir(), f"{config.bus.endpoint} {config.team.name} {plant}"
     name = sha256(of.encode()).hexdigest()[:20]
     return None if folder is None else folder / f"{name}.link"

@@ -46,11 +46,6 @@ _HELLO_TIMEOUT: Final = 2.0  # s, within which who connects says who it is
 class PlantEnd:
     """The connections of a plant, one to the agent of each of its robots.
 
-    Args:
-        config: the team's configuration.
-        names: of the plant's robots.
-        bus: the plant's.
-
     Attributes:
         received: what `receive` has received.
         connected: by robot.

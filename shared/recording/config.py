@@ -28,9 +28,8 @@ def recorded_config(recording: Recording) -> Config:
         RecordingError: the recording holds none, or one with keys or values that this version
             does not know, or of a planner that is not installed.
     """
-    found = recording.metadata
     try:
-        config = _build(found.get("config_json", ""))
+        return _build(recording.metadata.get("config_json", ""))
     except ConfigError as error:
         raise RecordingError(
             f"configuration of {recording.path}",
@@ -38,21 +37,16 @@ def recorded_config(recording: Recording) -> Config:
             error.expected,
             error.cause if error.name == "planner.kind" else _OTHER_VERSION,
         ) from None
-    if config is None:
+    except (ValueError, RecursionError):  # the latter for what nests too deeply
         got, expected = "metadata without a configuration", "config_json in the metadata"
-        raise RecordingError(str(recording.path), got, expected)
-    return config
+        raise RecordingError(str(recording.path), got, expected) from None
 
 
 @lru_cache(maxsize=8)  # every reader of a recording asks, and a configuration does not change
-def _build(text: str) -> Config | None:
-    """The configuration; None if the text is no table of sections."""
-    try:
-        sections = json.loads(text)
-    except (ValueError, RecursionError):  # the latter for what nests too deeply
-        return None
+def _build(text: str) -> Config:
+    sections = json.loads(text)
     if not isinstance(sections, dict):
-        return None
+        raise ValueError("no table of sections")
     keys = flatten(sections)
     for name in flatten(asdict(Config())):
         if name not in keys:

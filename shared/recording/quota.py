@@ -32,7 +32,6 @@ class Quota:
         largest: payload that is stored, bytes.
 
     Attributes:
-        largest: as given.
         refused: messages that were not stored, by reason: `OVERSIZED`, or `REFUSED` of what others
             send beyond `MAX_FOREIGN_KEYS`, in all files together.
     """

@@ -18,15 +18,10 @@ _SHORTEST: Final = 0.15  # of the time from the stand to the ground, a part of a
 
 
 class Motion(NamedTuple):
-    """A motion of the joints through postures, each reached at rest.
+    """A motion of the joints through postures, each reached at rest."""
 
-    Attributes:
-        postures: the first is where it begins, (k, 12), rad.
-        ends: when each of the others is reached, (k − 1,), s after the begin, rising.
-    """
-
-    postures: Array
-    ends: Array
+    postures: Array  # the first is where it begins, (k, 12), rad
+    ends: Array  # when each of the others is reached, (k − 1,), s after the begin, rising
 
     @property
     def seconds(self) -> float:

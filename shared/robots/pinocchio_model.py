@@ -13,10 +13,7 @@ def build_pinocchio_model(robot: RobotSpec, *, rotors: bool = False) -> pin.Mode
     """A robot on a free flyer: 18 velocities, joints in the order of `JOINT_NAMES`.
 
     The free flyer's velocity is that of the trunk origin, in the trunk's frame, linear first.
-
-    Args:
-        robot: its kind.
-        rotors: whether the joints have the inertia of their motors' rotors.
+    With `rotors` the joints have the inertia of their motors' rotors.
 
     Raises:
         ConfigError: the URDF is not installed or is not the one that the robot's record changes.

@@ -20,23 +20,14 @@ _PACKAGE: Final = "cmeel.prefix/share/example-robot-data/robots"
 
 
 class Geometry(NamedTuple):
-    """Lengths of a robot's legs, as compiled code takes them; left and right, front and rear alike.
+    """Lengths of a robot's legs for compiled code; left and right, front and rear are alike."""
 
-    Attributes:
-        hip_x: hip joint from the trunk's origin, forwards, m.
-        hip_y: likewise, outwards, m.
-        thigh_y: thigh joint from the hip joint, outwards, m.
-        link: length of the thigh, and of the calf, m.
-        foot_radius: m.
-        mass: of the whole robot, kg.
-    """
-
-    hip_x: float
-    hip_y: float
-    thigh_y: float
-    link: float
-    foot_radius: float
-    mass: float
+    hip_x: float  # hip joint from the trunk's origin, forwards, m
+    hip_y: float  # likewise, outwards, m
+    thigh_y: float  # thigh joint from the hip joint, outwards, m
+    link: float  # length of the thigh, and of the calf, m
+    foot_radius: float  # m
+    mass: float  # of the whole robot, kg
 
 
 @dataclass(frozen=True)
@@ -104,11 +95,6 @@ class RobotSpec:
     def torque_limit(self) -> Array:
         """Of every joint, in the order of `JOINT_NAMES`. Shape (12,), N·m."""
         return _read_only(np.tile(self.torque, N_LEGS))
-
-    @cached_property
-    def torque_bounds(self) -> Array:
-        """Least and greatest torque of every joint that stands. Shape (2, 12), N·m."""
-        return _read_only(np.stack([-self.torque_limit, self.torque_limit]))
 
     @cached_property
     def rotor_inertias(self) -> Array:

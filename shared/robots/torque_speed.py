@@ -12,19 +12,12 @@ from quadriga.shared.runtime.jit import compiled
 
 
 class MotorCurves(NamedTuple):
-    """Torque-speed curves of a robot's motors, by joint, (12,).
+    """Torque-speed curves of a robot's motors, by joint, (12,)."""
 
-    Attributes:
-        peak: torque that stands or brakes, N·m.
-        driving: torque along the joint's own rotation, up to the corner speed, N·m.
-        corner: speed from which on the driving torque falls, rad/s; infinite if it does not.
-        top: speed at which none is left, rad/s.
-    """
-
-    peak: Array
-    driving: Array
-    corner: Array
-    top: Array
+    peak: Array  # torque that stands or brakes, N·m
+    driving: Array  # torque along the joint's own rotation, up to the corner speed, N·m
+    corner: Array  # speed from which on the driving torque falls, rad/s; infinite if it does not
+    top: Array  # speed at which none is left, rad/s
 
 
 def motor_curves(robot: RobotSpec, *, torque_speed: bool) -> MotorCurves:
@@ -40,12 +33,7 @@ def torque_range(rate: float, curves: MotorCurves, k: int) -> tuple[float, float
     """Least and greatest torque of a motor, N·m.
 
     Its voltage is limited: from the corner speed on, the driving torque falls linearly. A motor
-    that brakes has its peak.
-
-    Args:
-        rate: of its joint, rad/s.
-        curves: of the robot.
-        k: which joint.
+    that brakes has its peak. The rate is that of joint `k`, rad/s.
     """
     peak, driving = curves.peak[k], curves.driving[k]
     if abs(rate) > curves.corner[k]:

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections import Counter
+from itertools import accumulate
 from typing import Final
 
 QUANTILES: Final = {"median": 0.5, "p99": 0.99}
 
 
 class Histogram:
-    """Counts values ≥ 0; its quantiles are exact to a bin's width.
-
-    Args:
-        width: of a bin, in the values' unit.
-    """
+    """Counts values ≥ 0; its quantiles are exact to a bin's width, which has their unit."""
 
     def __init__(self, width: float) -> None:
         self._width, self._max = width, 0.0
@@ -31,10 +29,8 @@ class Histogram:
         """
         if not self._bins:
             return {}
-        quantiles, seen, total = dict[str, float](), 0, self._bins.total()
-        for place in sorted(self._bins):
-            before, seen = seen, seen + self._bins[place]
-            for key, share in QUANTILES.items():
-                if before < share * total <= seen:
-                    quantiles[f"{name}.{key}"] = place * self._width
+        places = sorted(self._bins)
+        seen = list(accumulate(self._bins[place] for place in places))
+        found = {key: places[bisect_left(seen, q * seen[-1])] for key, q in QUANTILES.items()}
+        quantiles = {f"{name}.{key}": place * self._width for key, place in found.items()}
         return {**quantiles, f"{name}.max": self._max}

@@ -7,6 +7,7 @@ import importlib.metadata
 import os
 import platform
 import sys
+from collections.abc import Iterable
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -37,14 +38,20 @@ def package_versions() -> dict[str, str]:
 @cache
 def code_digest() -> str:
     """Digest of this project's source files, wherever they lie; 16 hexadecimal digits."""
-    folder, digest = Path(quadriga.__file__).parent, hashlib.sha256()
+    folder = Path(quadriga.__file__).parent
     found = (  # in a checkout some of its folders are links, which `rglob` does not follow
         Path(parent, name)
         for parent, _, names in os.walk(folder, followlinks=True)
         for name in names
         if name.endswith(".py")
     )
-    for name, path in sorted((path.relative_to(folder).as_posix(), path) for path in found):
+    return digest_files(sorted((path.relative_to(folder).as_posix(), path) for path in found))
+
+
+def digest_files(files: Iterable[tuple[object, Path]]) -> str:
+    """Digest of files and of the names that they go by here; 16 hexadecimal digits."""
+    digest = hashlib.sha256()
+    for name, path in files:
         digest.update(f"\0{name}\0".encode() + path.read_bytes())
     return digest.hexdigest()[:16]
 

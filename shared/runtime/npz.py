@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 _LARGEST: Final = 1 << 31  # bytes of all arrays together
 _ARCHIVE: Final = b"PK\x03\x04"  # else NumPy takes it for a bare array, of any size
-GREATEST: Final = 1e15  # that anything measured can be, whatever its unit
+_GREATEST: Final = 1e15  # that anything measured can be, whatever its unit
 _NUMBERS: Final = "fiu"  # NumPy's kinds of types
 
 # What NumPy, its parsers and the archive's raise on bytes that are damaged, and what checks of the
@@ -32,7 +32,7 @@ UNREADABLE: Final = (
 
 
 def as_measured(
-    name: str, array: Any, axes: int, *, gaps: bool = False, most: float = GREATEST
+    name: str, array: Any, axes: int, *, gaps: bool = False, most: float = _GREATEST
 ) -> NDArray[np.float64]:
     """An array of a file as measured numbers, of any unit.
 
@@ -56,11 +56,6 @@ def as_measured(
     if numbers.ndim != axes or not fine.all():
         raise ValueError(f"{name} of shape {numbers.shape}, or what nobody measures in it")
     return numbers
-
-
-def as_counts(name: str, array: Any, axes: int) -> NDArray[np.int64]:
-    """An array of a file as integers, such as ticks in ms; see `as_measured`."""
-    return as_measured(name, array, axes).astype(np.int64)
 
 
 @contextmanager

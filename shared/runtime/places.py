@@ -15,7 +15,8 @@ import quadriga
 SOURCE: Final = Path(quadriga.__file__).parents[1]
 _OF_OTHERS: Final = 0o077  # permissions of others than the owner
 # Files that come with the code: in a checkout links to `deploy`, where they are kept.
-_DEPLOY: Final = SOURCE / "quadriga" / "deploy"
+SCENARIOS: Final = SOURCE / "quadriga" / "deploy" / "scenarios"  # and traces
+EXPERIMENTS: Final = SOURCE / "quadriga" / "deploy" / "experiments"
 
 
 def cache_dir() -> Path:
@@ -30,8 +31,7 @@ def runtime_dir() -> Path:
     Where the system has none it is in the folder of temporary files, which others may write to:
     whoever reads there must see whose it is.
     """
-    base = os.environ.get("XDG_RUNTIME_DIR")
-    if base:
+    if base := os.environ.get("XDG_RUNTIME_DIR"):
         return Path(base) / "quadriga"
     return Path(tempfile.gettempdir()) / f"quadriga-{os.getuid()}"
 
@@ -59,13 +59,3 @@ def cache_file(kind: str, key: str) -> Path:
 def cache_files(kind: str) -> list[Path]:
     """All files of a kind in the cache, sorted by name."""
     return sorted(cache_dir().glob(f"{kind}-*.npz"))
-
-
-def scenario_folder() -> Path:
-    """Where scenarios and traces are kept."""
-    return _DEPLOY / "scenarios"
-
-
-def experiment_folder() -> Path:
-    """Where experiments are kept."""
-    return _DEPLOY / "experiments"

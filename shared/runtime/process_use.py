@@ -8,18 +8,13 @@ from typing import NamedTuple
 
 
 class ProcessUse(NamedTuple):
-    """What a process has taken so far.
+    """What a process has taken so far."""
 
-    Attributes:
-        started: when it was started, in clock ticks since the system was; with the process id it
-            names a process for good, since ids are given again.
-        cpu_s: of processor time, s.
-        memory: that it holds, bytes.
-    """
-
+    # When it was started, in clock ticks since the system was; with the process id it names a
+    # process for good, since ids are given again.
     started: int
-    cpu_s: float
-    memory: int
+    cpu_s: float  # of processor time, s
+    memory: int  # that it holds, bytes
 
 
 def read_use(pid: int) -> ProcessUse | None:

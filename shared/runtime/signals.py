@@ -9,7 +9,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from types import FrameType
 from typing import Final
 
@@ -47,8 +47,8 @@ def stop_on_signals() -> StopFlag:
 
 @contextmanager
 def _handled(handle: Callable[[int, FrameType | None], object]) -> Iterator[None]:
-    """Within the block `handle` is called with SIGINT and SIGTERM, which reach the main thread."""
-    before = {number: signal.signal(number, handle) for number in _STOPS}
+    """Within the block `handle` is called with SIGINT and SIGTERM, if this is the main thread."""
+    before = {number: signal.signal(number, handle) for number in _STOPS if _is_main_thread()}
     try:
         yield
     finally:
@@ -64,10 +64,7 @@ def _is_main_thread() -> bool:
 def stop_flag() -> Iterator[StopFlag]:
     """A flag that SIGINT and SIGTERM set within the block; never that of another thread."""
     flag = StopFlag()
-    if _is_main_thread():
-        with _handled(flag.set):
-            yield flag
-    else:
+    with _handled(flag.set):
         yield flag
 
 
@@ -83,12 +80,7 @@ def interruptible(stopped: Callable[[], bool]) -> Iterator[None]:
     Raises:
         KeyboardInterrupt: the process is to stop, or was to before the block.
     """
-    if stopped():
-        raise KeyboardInterrupt
-    if not isinstance(stopped, StopFlag):
-        yield
-        return
-    with _handled(_interrupt):
+    with _handled(_interrupt) if isinstance(stopped, StopFlag) else nullcontext():
         if stopped():
             raise KeyboardInterrupt
         yield

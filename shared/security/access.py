@@ -15,32 +15,20 @@ import re
 from collections.abc import Sequence
 from typing import Any, Final, NamedTuple
 
-from quadriga.shared import members
+from quadriga.shared import members, topics
 from quadriga.shared.about import about_key
 from quadriga.shared.codec import MAX_BYTES
 from quadriga.shared.config.sections import Config
-from quadriga.shared.members import AGENT, DOCTOR, LEADS, OBSERVER, RECORDER, ROUTER, Member, Role
+from quadriga.shared.members import LEADS, OBSERVER, ROUTER, Member, Role
 from quadriga.shared.robots.conventions import robot_names
-from quadriga.shared.topics import (
-    CLOCK,
-    COMMAND,
-    ESTOP,
-    RECEIVED,
-    STATE,
-    STATUS,
-    TABLE,
-    TICKS,
-    TRUTH,
-    Topic,
-)
+from quadriga.shared.topics import RECEIVED, STATE, TABLE, Topic
 
-_SPEAKERS: Final = (members.ESTOP, members.STOP, members.RESET, members.RESUME)
-_OTHERS: Final = (members.LAUNCHER, *_SPEAKERS, DOCTOR, OBSERVER, ROUTER)
+_OTHERS: Final = (members.LAUNCHER, *members.SPEAKERS, members.DOCTOR, OBSERVER, ROUTER)
 _OBSERVER_NAME: Final = re.compile(r".+-\d+")  # such as echo-4711
 
 _IN, _OUT, _BOTH = ["ingress"], ["egress"], ["ingress", "egress"]
-_HEARERS: Final = (RECORDER, OBSERVER, DOCTOR)  # they hear everything and say nothing
-_OF_LEAD: Final = (CLOCK, TRUTH)  # only who drives time knows
+_HEARERS: Final = (members.RECORDER, OBSERVER, members.DOCTOR)  # they hear all and say nothing
+_OF_LEAD: Final = (topics.CLOCK, topics.TRUTH)  # only who drives time knows
 
 _SPARE_SESSIONS: Final = 8  # for those who look on, and who has yet to be found dead
 
@@ -80,18 +68,18 @@ def team_rights(config: Config) -> dict[str, Rights]:
         if role in _HEARERS:
             found[who.name] = Rights([], [f"{team}/**"])
         elif role != ROUTER:
-            sent = [topic for topic in TABLE if topic is ESTOP or role in topic.senders]
-            heard = [topic for topic in TABLE if role in topic.receivers]
+            sent = [topic for topic in TABLE if topic is topics.ESTOP or role in topic.senders]
+            of = who.robot if role == members.AGENT else "*"  # whose states it hears
             found[who.name] = Rights(
                 [_key(t, team, name) for t in sent for name in _names(who, t, robots)],
-                [_key(t, team, who.robot if t is STATE and role == AGENT else "*") for t in heard],
+                [_key(t, team, of if t is STATE else "*") for t in topics.topics_for(role)],
             )
     return found
 
 
 def _key(topic: Topic, team: str, robot: str) -> str:
     """The key of a topic; states and commands have those of the plant link."""
-    return (topic.link_key if topic in (STATE, COMMAND) else topic.key)(team, robot)
+    return (topic.link_key if topic in (STATE, topics.COMMAND) else topic.key)(team, robot)
 
 
 def _names(who: Member, topic: Topic, robots: Sequence[str]) -> Sequence[str]:
@@ -100,7 +88,7 @@ def _names(who: Member, topic: Topic, robots: Sequence[str]) -> Sequence[str]:
         return ()
     if not topic.per_robot:
         return ("",)
-    if topic in (STATUS, TICKS):
+    if topic in (topics.STATUS, topics.TICKS):
         return (who.name,)
     return (who.robot,) if who.robot else robots
 

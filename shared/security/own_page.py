@@ -24,9 +24,7 @@ def is_of_own_page(headers: Headers, names: Collection[str] = ()) -> bool:
     then says whose page that is (`Origin`, RFC 6454 section 7). A stranger's name that leads here
     stands in `Host`. The port may be another one than the server's, if that was forwarded.
 
-    Args:
-        headers: of the request.
-        names: of the computers at which the page is found; empty: any.
+    The page is found at computers of these names; of none: at any.
     """
     hosts, origins = headers.get_all("Host"), headers.get_all("Origin")
     if len(hosts) != 1 or len(origins) > 1:

@@ -218,10 +218,7 @@ def _check(handle: int, what: str) -> int:
 class StructReader:
     """Takes samples of a topic: best effort, of the last ones.
 
-    Args:
-        participant: of the domain.
-        topic: that it reads.
-        of_others: whether it reads nothing that this participant writes.
+    With `of_others` it reads nothing that this participant writes.
 
     Raises:
         BridgeError: the topic is there with another type.
@@ -262,7 +259,7 @@ class StructReader:
 
 
 class StructWriter:
-    """Writes samples of a topic, reliably; its arguments as those of `StructReader`."""
+    """Writes samples of a topic, reliably."""
 
     def __init__(self, participant: DdsParticipant, topic: StructTopic) -> None:
         self._library = participant.library

@@ -35,73 +35,44 @@ class PacketError(QuadrigaError):
 
 @dataclass(frozen=True, slots=True)
 class Battery:
-    """What a robot says of its battery.
+    """What a robot says of its battery."""
 
-    Attributes:
-        charge: 0 … 100 %.
-        current: out of the battery negative, A.
-        voltage: V; None of a robot that does not tell it.
-    """
-
-    charge: int
-    current: float
-    voltage: float | None = None
+    charge: int  # 0 … 100 %
+    current: float  # out of the battery negative, A
+    voltage: float | None = None  # V; None of a robot that does not tell it
 
 
 @dataclass(frozen=True, slots=True)
 class MotorTargets:
-    """What the twelve motors are to do: τ = tau + kp (q − q_measured) + kd (dq − dq_measured).
+    """What the twelve motors are to do: τ = tau + kp (q − q_measured) + kd (dq − dq_measured)."""
 
-    Attributes:
-        mode: of each motor, (12,): `SERVO`, `ON` or `OFF`.
-        q: rad, (12,), joints in this project's order, as all others.
-        dq: rad/s.
-        tau: N·m.
-        kp: N·m/rad.
-        kd: N·m·s/rad.
-    """
-
-    mode: NDArray[np.uint8]
-    q: Array
-    dq: Array
-    tau: Array
-    kp: Array
-    kd: Array
+    mode: NDArray[np.uint8]  # of each motor, (12,): `SERVO`, `ON` or `OFF`
+    q: Array  # rad, (12,), joints in this project's order, as all others
+    dq: Array  # rad/s
+    tau: Array  # N·m
+    kp: Array  # N·m/rad
+    kd: Array  # N·m·s/rad
 
 
 @dataclass(frozen=True, slots=True)
 class RobotReport:
-    """What a robot measures and says of itself in one packet.
+    """What a robot measures and says of itself in one packet; legs in this project's order."""
 
-    Attributes:
-        tick: the robot's own counter; its unit and where it begins are not known.
-        quat_wxyz: attitude, trunk to world, (4,).
-        gyro: rad/s, trunk frame, (3,).
-        accel: specific force, m/s², trunk frame, at the IMU, (3,).
-        q, dq, tau: of the joints in this project's order, (12,), rad, rad/s, N·m.
-        foot: raw counts of the feet's sensors in this project's order, (4,).
-        mode: of each motor, (12,).
-        temperature: of each motor, (12,), °C.
-        lost: packets that each motor has missed, (12,); zeros of a robot that does not count them.
-        imu_temperature: °C.
-        remote: of the remote control, 40 bytes, see `asks_to_stop`.
-        battery: None of a robot that says nothing of it.
-    """
-
-    tick: int
-    quat_wxyz: Array
-    gyro: Array
-    accel: Array
-    q: Array
-    dq: Array
-    tau: Array
-    foot: Array = field(default_factory=lambda: np.zeros(N_LEGS))
+    tick: int  # the robot's own counter; its unit and where it begins are not known
+    quat_wxyz: Array  # attitude, trunk to world, (4,)
+    gyro: Array  # rad/s, trunk frame, (3,)
+    accel: Array  # specific force, m/s², trunk frame, at the IMU, (3,)
+    q: Array  # of the joints, as all that follow, (12,), rad
+    dq: Array  # rad/s
+    tau: Array  # N·m
+    foot: Array = field(default_factory=lambda: np.zeros(N_LEGS))  # raw counts of the sensors, (4,)
     mode: NDArray[np.uint8] = field(default_factory=lambda: np.zeros(N_JOINTS, dtype=np.uint8))
-    temperature: Array = field(default_factory=lambda: np.zeros(N_JOINTS))
+    temperature: Array = field(default_factory=lambda: np.zeros(N_JOINTS))  # °C
+    # Packets that each motor has missed; zeros of a robot that does not count them.
     lost: NDArray[np.int64] = field(default_factory=lambda: np.zeros(N_JOINTS, dtype=np.int64))
-    imu_temperature: int = 0
-    remote: bytes = bytes(40)
-    battery: Battery | None = None
+    imu_temperature: int = 0  # °C
+    remote: bytes = bytes(40)  # of the remote control, see `asks_to_stop`
+    battery: Battery | None = None  # None of a robot that says nothing of it
 
 
 def asks_to_stop(remote: bytes) -> bool:

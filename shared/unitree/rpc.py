@@ -55,31 +55,18 @@ def _topic(service: str, kind: str, layout: Any) -> StructTopic:
 
 
 class RpcMessage(NamedTuple):
-    """A request or a response.
+    """A request or a response."""
 
-    Attributes:
-        id: number of the request.
-        api: which call.
-        text: its parameters, or what it gives; usually JSON.
-        code: of a response, 0 if all is well.
-    """
-
-    id: int
-    api: int
-    text: str
-    code: int = OK
+    id: int  # number of the request
+    api: int  # which call
+    text: str  # its parameters, or what it gives; usually JSON
+    code: int = OK  # of a response, 0 if all is well
 
 
 class RpcEnd:
     """One end of a service: it sends messages of one kind and receives those of the other.
 
-    Args:
-        participant: of the domain.
-        service: its name.
-        serves: whether this is the end that responds.
-
-    Attributes:
-        service: its name.
+    The end that `serves` responds.
     """
 
     def __init__(self, participant: DdsParticipant, service: str, *, serves: bool) -> None:

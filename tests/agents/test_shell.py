@@ -70,12 +70,8 @@ class Played:
 
     # The bus.
 
-    def publisher(self, key: str, *, waits: bool = True) -> Callable[[bytes], None]:
+    def publisher(self, key: str, **_: bool) -> Callable[[bytes], None]:
         return lambda payload: self.sent.append((key, payload))
-
-    @property
-    def has_mail(self) -> bool:
-        return bool(self.mail)
 
     def get(self, timeout: float) -> tuple[str, bytes] | None:
         if timeout:  # somebody waits for what peers have sent by now

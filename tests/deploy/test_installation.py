@@ -21,10 +21,10 @@ FOLDERS = ("agents", "shared", "sim_server", "plant")
 SEEN = """
 import quadriga
 from quadriga.experiments.published.catalogue import list_names
-from quadriga.shared.runtime.places import scenario_folder
+from quadriga.shared.runtime.places import SCENARIOS
 from quadriga.team.scenarios import names
 print(quadriga.load_config(scenario="stairs").world.scenario, len(names()), len(list_names()))
-print(quadriga.__file__, scenario_folder())
+print(quadriga.__file__, SCENARIOS)
 """
 
 

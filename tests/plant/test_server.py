@@ -44,11 +44,10 @@ class Listener:
         self.packets: list[tuple[str, bool, bytes]] = []
         self.heard: dict[str, Callable[[bytes], None]] = {}
 
-    def publisher(self, key: str, *, waits: bool = True) -> Callable[[bytes], None]:
-        return lambda payload: self.packets.append((key, waits, payload))
-
-    def urgent_publisher(self, key: str) -> Callable[[bytes], None]:
-        return self.publisher(key, waits=False)
+    def publisher(
+        self, key: str, *, waits: bool = True, urgent: bool = False
+    ) -> Callable[[bytes], None]:
+        return lambda payload: self.packets.append((key, waits and not urgent, payload))
 
     def hear(self, key: str, call: Callable[[bytes], None]) -> None:
         self.heard[key] = call

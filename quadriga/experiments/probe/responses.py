@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from quadriga.shared.errors import PredictorFileError
 from quadriga.shared.robots.conventions import N_FORCES, N_OUTPUTS, Array
 from quadriga.shared.runtime.atomic import atomic_write
-from quadriga.shared.runtime.npz import UNREADABLE, as_counts, as_measured, open_npz
+from quadriga.shared.runtime.npz import UNREADABLE, as_measured, open_npz
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,9 +102,9 @@ def read_repetition(path: Path) -> Repetition:
     """
     try:
         with open_npz(path) as archive:
-            seed, ticks = int(archive["seed"]), as_counts("ticks", archive["ticks"], 1)
+            seed, ticks = int(archive["seed"]), as_measured("ticks", archive["ticks"], 1)
             u, y = _check_signals(archive["u"], archive["y"], len(ticks))
-            return Repetition(seed, ticks, u, y)
+            return Repetition(seed, ticks.astype(np.int64), u, y)
     except UNREADABLE as error:
         raise PredictorFileError(
             f"responses {path}",

@@ -9,10 +9,10 @@ from typing import Final
 from quadriga.experiments.published.experiment import Experiment
 from quadriga.experiments.published.experiment_file import read_experiment
 from quadriga.shared.errors import ConfigError, did_you_mean
-from quadriga.shared.runtime.places import SOURCE, experiment_folder
+from quadriga.shared.runtime.places import EXPERIMENTS, SOURCE
 
 CHECKOUT: Final = SOURCE
-FOLDER: Final = experiment_folder()
+FOLDER: Final = EXPERIMENTS
 # In this order on the page: what was promised, then what explains it, then how far it goes.
 _ORDER: Final = (
     "paper", "as-written", "hard", "edge", "distribution", "low-level", "realism", "ideas",

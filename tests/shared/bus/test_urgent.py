@@ -87,7 +87,7 @@ def longest_way(r1: Bus, put: Callable[[bytes], None]) -> float:
 
 def test_what_waits_for_nobody_arrives_though_a_link_is_full(congested: tuple[Bus, Bus]) -> None:
     (operator, r1), key = congested, "team/operator/x"
-    assert longest_way(r1, operator.urgent_publisher(key)) < SOON
+    assert longest_way(r1, operator.publisher(key, urgent=True)) < SOON
     assert longest_way(r1, operator.publisher(key, waits=False)) < SOON
     # What waits for everybody is held up: the link is full indeed.
     assert longest_way(r1, operator.publisher(key)) > SOON
