@@ -19,7 +19,7 @@ from quadriga.agents.predictor.episode import (
     team_layout,
     wrench_map,
 )
-from quadriga.agents.predictor.periodic import Period, PeriodicFactors, fit_periodic
+from quadriga.agents.predictor.periodic import FACTORS, Period, PeriodicFactors, fit_periodic
 from quadriga.agents.predictor.regression import (
     check_excitation,
     normal_equations,
@@ -206,7 +206,9 @@ class Predictor:
 
     def arrays(self) -> Mapping[str, Array]:
         """What it is made of, by name: with the meta all that a file must hold."""
-        return self.parts.arrays() if isinstance(self.parts, PeriodicFactors) else {"G": self.parts}
+        if isinstance(self.parts, PeriodicFactors):
+            return {name: getattr(self.parts, name) for name in FACTORS}
+        return {"G": self.parts}
 
     def predict(self, z: Array, phase: int = 0) -> Array:
         """Predicted output deviations of all agents.
