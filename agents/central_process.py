@@ -143,7 +143,6 @@ class _CentralShell:
             self._counters[f"plan_{code_of(plan.status)}"] += 1
         if state.refused:
             self._counters[REFUSED] = state.refused
-        took, none = np.array([1e-6 * outputs.planner_ns]), np.zeros(0)
-        counters = dict(self._counters)
-        status = Status(plan.tick, plan.stamp_ns, "plan", "", "", {}, counters, took, none)
+        took, counters = np.array([1e-6 * outputs.planner_ns]), dict(self._counters)
+        status = Status(plan.tick, plan.stamp_ns, "plan", "", "", {}, counters, took, np.zeros(0))
         self._put[""](encode(status))

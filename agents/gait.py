@@ -52,26 +52,16 @@ def nominal_forces(stance: NDArray[np.bool_], weight: float) -> Array:
 
 @lru_cache
 def nominal_table(weight: float) -> Array:
-    """Nominal forces of all 16 stance patterns, by the bits of the legs. Shape (16, 12), N.
-
-    Args:
-        weight: of the robot, m g, N.
-    """
+    """Nominal forces of all 16 stance patterns, by the bits of the legs. Shape (16, 12), N."""
     stance = np.arange(16)[:, None] & _BITS > 0
-    forces = np.zeros((16, N_LEGS, 3))
-    forces[..., 2] = stance * weight / np.maximum(stance.sum(axis=1), 1)[:, None]
-    table = forces.reshape(16, 3 * N_LEGS)
+    table = np.zeros((16, 3 * N_LEGS))
+    table[:, 2::3] = stance * weight / np.maximum(stance.sum(axis=1), 1)[:, None]
     table.setflags(write=False)
     return table
 
 
 class Gait:
-    """One robot's gait, looked up at each tick.
-
-    Args:
-        config: the team's configuration.
-        index: the robot's place in the team, 0-based.
-    """
+    """The gait of robot `index` (0-based), looked up at each tick."""
 
     def __init__(self, config: Config, index: int) -> None:
         stance_ms, self._stand_ms = config.gait.stance_ms, config.gait.stand_ms
@@ -151,8 +141,7 @@ def first_due_step(config: Config, since: int) -> int:
 
     Of one that begins in the midst of a walk none is due before its window is whole.
     """
-    first = first_step(config)
-    return max(first, first_step(config, since)) if since > config.gait.stand_ms else first
+    return first_step(config, since if since > config.gait.stand_ms else 0)
 
 
 def patience(config: Config) -> int:

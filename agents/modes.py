@@ -75,12 +75,7 @@ Statuses = Mapping[str, Status]  # the newest of each other robot that has spoke
 
 
 class ModeRules:
-    """Fixed data of when one robot changes its mode; what it gives depends on arguments alone.
-
-    Args:
-        config: the team's configuration.
-        robot: the robot's name.
-    """
+    """Fixed data of when one robot changes its mode; what it gives depends on arguments alone."""
 
     def __init__(self, config: Config, robot: str) -> None:
         self._peers = tuple(n for n in robot_names(config.team.robots) if n != robot)
@@ -171,8 +166,7 @@ class ModeRules:
         if inputs.stop is not None:
             stopped = max(stopped, min(inputs.stop.tick or tick, tick))
         if not mode.may_resume:
-            after = ResumeState(resumed=resume.resumed, stopped=stopped)
-            return resume if after == resume else after
+            return ResumeState(resumed=resume.resumed, stopped=stopped)
         since = -1
         if inputs_ok:
             next_half_cycle = tick + self._stance_ms - (tick - self._stand_ms) % self._stance_ms

@@ -58,11 +58,7 @@ class StandUp:
 
 
 class StandUpRules:
-    """Fixed data of how a robot stands up; what it gives depends on arguments alone.
-
-    Args:
-        config: the team's configuration.
-    """
+    """Fixed data of how a robot stands up; what it gives depends on arguments alone."""
 
     def __init__(self, config: Config) -> None:
         self._by_bridge = config.team.plant == BRIDGED  # which gets its robot up by itself
@@ -107,7 +103,9 @@ class StandUpRules:
         if stand_up.motion is None and may_move:
             stand_up = StandUp(stand_up.held, tick, way_up(state.q_joint, self._robot, _SECONDS))
         command = self._command(stand_up, state)
-        if self._since_motion(stand_up, tick) >= _SETTLE_MS and self._is_up(state):
+        settled = self._since_motion(stand_up, tick) >= _SETTLE_MS
+        near = (np.abs(state.q_joint - self._robot.q_stand) <= _OFF).all()
+        if settled and near and _upright(state) >= _LEVEL:
             return Mode(STAND, tick, mode.reason), None, command
         return mode, stand_up, command
 
@@ -125,11 +123,6 @@ class StandUpRules:
         if stand_up.motion is None:
             return -1
         return tick - stand_up.begun - round(1e3 * stand_up.motion.seconds)
-
-    def _is_up(self, state: State) -> bool:
-        """Whether the joints are at the stand, and the trunk is level."""
-        off = np.abs(state.q_joint - self._robot.q_stand)
-        return bool((off <= _OFF).all()) and _upright(state) >= _LEVEL
 
     def _command(self, stand_up: StandUp, state: State) -> Command:
         """The command that leads the joints, which motors follow by themselves."""

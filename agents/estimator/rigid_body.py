@@ -155,10 +155,8 @@ def momentum_of(inertia: Inertia, motion: Spatial) -> Spatial:
         xz * w[0] + yz * w[1] + zz * w[2],
     )
     linear_momentum = (mass * linear[0], mass * linear[1], mass * linear[2])
-    return (
-        add_vectors(linear_momentum, vector_product(w, h)),
-        add_vectors(spin, vector_product(h, linear)),
-    )
+    p = add_vectors(linear_momentum, vector_product(w, h))
+    return p, add_vectors(spin, vector_product(h, linear))
 
 
 @compiled
@@ -323,11 +321,8 @@ def foot_forces(torques: Array, q_joint: Array, geometry: Geometry | np.record) 
     out, link = np.zeros((4, 3)), geometry.link
     for leg in range(4):
         first, y = 3 * leg, geometry.thigh_y if leg % 2 == 0 else -geometry.thigh_y
-        hip, thigh, calf = (
-            q_joint[first],
-            q_joint[first + 1],
-            q_joint[first + 1] + q_joint[first + 2],
-        )
+        hip, thigh = q_joint[first], q_joint[first + 1]
+        calf = thigh + q_joint[first + 2]
         # In the hip frame, before the roll by the hip angle about x; of thigh and calf.
         ca, sa = np.cos(hip), np.sin(hip)
         sb, cb, sc, cc = np.sin(thigh), np.cos(thigh), np.sin(calf), np.cos(calf)
@@ -445,10 +440,9 @@ def _complete_inverse(whole: Inertia, reaction: Array, reduced: Array, M_inverse
     trunk = np.eye(6)
     for k in range(6):
         e = trunk[k]
-        linear, angular = momentum_of(whole, ((e[0], e[1], e[2]), (e[3], e[4], e[5])))
-        for i in range(3):
-            reduced[i, k] += linear[i]
-            reduced[3 + i, k] += angular[i]
+        momentum = momentum_of(whole, ((e[0], e[1], e[2]), (e[3], e[4], e[5])))
+        for i in range(6):
+            reduced[i, k] += momentum[i // 3][i % 3]
     cholesky_solve(cholesky(reduced), trunk)
     coupled = product(trunk, reaction)
     M_inverse[:6, :6] = trunk
@@ -499,14 +493,6 @@ def add_gram(weight: float, A: Array, H: Array) -> None:
             a = weight * A[k, i]
             for j in range(i + 1):
                 H[i, j] += a * A[k, j]
-
-
-@compiled
-def symmetrise(H: Array) -> None:
-    """Copy the lower triangle of H to the upper one."""
-    for i in range(H.shape[0]):
-        for j in range(i):
-            H[j, i] = H[i, j]
 
 
 @compiled

@@ -113,13 +113,8 @@ def build_team_problem(
         F_past += slope @ block[:, :past]
         H += slope @ block[:, past + columns]
     own = predictor.block(index, index, phase)
-    condensed = Condensed(
-        H=0.5 * (H + H.T),
-        F_past=F_past,
-        F_des=-slopes.sum(axis=0),
-        Y_v=np.ascontiguousarray(own[:, past + columns]),
-        Y_past=np.ascontiguousarray(own[:, :past]),
-    )
+    Y_v, Y_past = (np.ascontiguousarray(own[:, part]) for part in (past + columns, slice(past)))
+    condensed = Condensed(0.5 * (H + H.T), F_past, -slopes.sum(axis=0), Y_v, Y_past)
     return constrain(config.planner, config.robot.weight, condensed, stance)
 
 

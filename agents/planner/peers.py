@@ -143,7 +143,7 @@ class Neighbours:
 
     def initial(self) -> PeerMemory:
         """The memory before the first message."""
-        return PeerMemory({name: PeerHistory() for name in self._indices})
+        return PeerMemory(dict.fromkeys(self._indices, PeerHistory()))
 
     def remember(
         self,
@@ -202,12 +202,7 @@ class Neighbours:
         )
 
     def is_complete(self, memory: PeerMemory, serial: tuple[int, int]) -> bool:
-        """Whether every peer's plan of this step and exchange is there, and its window before it.
-
-        Args:
-            memory: what has been remembered.
-            serial: step and exchange, see `Plan.serial`.
-        """
+        """Whether every peer's plan of this `Plan.serial` is there, and its window before it."""
         end = serial[0] * self._step_ms
         return all(
             history.plans
@@ -260,18 +255,13 @@ class Neighbours:
         """Status of a peer at step `last`, the age of its newest plan, and its plans until then."""
         oldest = first_step - patience(self._config)  # what is older was made before a stop
         plans = tuple(plan for plan in history.plans if oldest <= plan.step <= last)
-        age = last - (plans[-1].step if plans else first_step - 1)
-        if age > patience(self._config) or self._has_stopped(history, plans, last):
+        age, end = last - (plans[-1].step if plans else first_step - 1), last * self._step_ms
+        newest = [sample for sample in history.measurements if sample.tick <= end][-1:]
+        # A peer that has come to stand since its newest plan makes none any more.
+        stopped = plans and newest and newest[0].tick > plans[-1].tick and _stands(newest[0])
+        if age > patience(self._config) or stopped:
             return LOST, age, plans
         return SILENT if age > self._config.planner.max_peer_age else USABLE, age, plans
-
-    def _has_stopped(self, history: PeerHistory, plans: tuple[Plan, ...], last: int) -> bool:
-        """Whether a peer has come to stand since its newest plan: it makes none any more."""
-        end = last * self._step_ms
-        sample = next((s for s in reversed(history.measurements) if s.tick <= end), None)
-        if not plans or sample is None:
-            return False
-        return sample.tick > plans[-1].tick and _stands(sample)
 
     def _window(
         self,
@@ -330,16 +320,11 @@ def _insert(held: tuple[M, ...], new: M, oldest: int) -> tuple[M, ...]:
 
 
 class Peers:
-    """Fixed data of one agent's coupling to its peers; its functions depend on arguments alone.
+    """How its peers act on agent `index`, 0-based; functions of their arguments alone.
 
     A swinging leg of a peer carries no force: its columns of G, a third of all, are left out, which
     is exact. Single precision changes an effect by 3e-7 of its size and halves the memory that is
     read.
-
-    Args:
-        config: the team's configuration.
-        index: this agent's place in the team, 0-based.
-        predictor: fitted for this team.
     """
 
     def __init__(self, config: Config, index: int, predictor: Predictor) -> None:
@@ -388,20 +373,18 @@ class Peers:
     def _build_coupling(
         self, step: int, window_step: int
     ) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
-        """Of all peers' z at a step, whose plans begin at `window_step`: places, and rows of G."""
-        stance = [horizon_stance(self._config, j, window_step) for j in self._others]
-        return couple(self._blocks(step), stance)
+        """Of all peers' z at a step, whose plans begin at `window_step`: places, and rows of G.
 
-    def _blocks(self, step: int) -> list[Array]:
-        """G_ij of each peer; with the team's cost [G_ij; M_ij]."""
+        With the team's cost those are the rows of [G_ij; M_ij].
+        """
         config, index, predictor = self._config, self._index, self._predictor
         phase = phase_of(config, step, predictor.phases)
         blocks = [predictor.block(index, j, phase) for j in self._others]
-        if not self._cooperative:
-            return blocks
-        slopes = team_slope(config, predictor, index, step)
-        rows = [peer_slope(slopes, predictor, j, phase) for j in self._others]
-        return [np.concatenate(pair) for pair in zip(blocks, rows, strict=True)]
+        if self._cooperative:
+            slopes = team_slope(config, predictor, index, step)
+            rows = [peer_slope(slopes, predictor, j, phase) for j in self._others]
+            blocks = [np.concatenate(pair) for pair in zip(blocks, rows, strict=True)]
+        return couple(blocks, [horizon_stance(config, j, window_step) for j in self._others])
 
 
 def couple(

@@ -46,12 +46,7 @@ _NO_SETPOINT = Setpoint()
 
 
 class PlanCheck:
-    """What every plan of a robot must keep to, whoever has made it.
-
-    Args:
-        config: the team's configuration.
-        index: the robot's place in the team, 0-based.
-    """
+    """What every plan of robot `index`, 0-based, must keep to, whoever has made it."""
 
     def __init__(self, config: Config, index: int) -> None:
         self._config, self._index, self._step_ms = config, index, step_ms(config)
@@ -95,9 +90,8 @@ class PlanCheck:
             inputs: of the same step.
             plans: in force before.
         """
-        plan, active, fault = outputs.plan, outputs.active, ""
-        if plan is not None:
-            fault = self.fault_of(plan, inputs.tick)
+        plan, active = outputs.plan, outputs.active
+        fault = "" if plan is None else self.fault_of(plan, inputs.tick)
         if active is not None:
             fault = fault or self.fault_of_active(active, inputs.tick)
         if fault:

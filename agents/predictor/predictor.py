@@ -83,14 +83,9 @@ class PredictorMeta:
             for section, keys in _KEYS.items()
             for key in keys
         }
+        known |= {"kind": config.identification.predictor, "response": config.response_file}
         controller = {k: v for k, v in asdict(config.controller).items() if k not in _SAFETY_KEYS}
-        return cls(
-            kind=config.identification.predictor,
-            phases=1,
-            controller=tuple(sorted(controller.items())),
-            response=config.response_file,
-            **known,
-        )
+        return cls(phases=1, controller=tuple(sorted(controller.items())), **known)
 
     def to_dict(self) -> dict[str, Any]:
         """A dictionary that can be written as JSON."""
@@ -106,10 +101,9 @@ class PredictorMeta:
         Raises:
             TypeError, AttributeError, KeyError: fields are missing, unknown or of another type.
         """
-        changes: dict[str, Any] = {"controller": tuple(sorted(body["controller"].items()))}
-        if "plant" in body:
-            changes["plant"] = Layout(**{k: as_tuples(v) for k, v in body["plant"].items()})
-        return cls(**body | changes)
+        plant, controller = body.get("plant"), tuple(sorted(body["controller"].items()))
+        layout = plant and Layout(**{k: as_tuples(v) for k, v in plant.items()})
+        return cls(**body | {"controller": controller, "plant": layout})
 
     @property
     def layout(self) -> Layout:
