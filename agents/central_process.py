@@ -42,11 +42,8 @@ def run(
 ) -> None:
     """Plan for the whole team until the walk ends or it is stopped.
 
-    Args:
-        config: the team's configuration.
-        planner: the team's planner.
-        stopped: asked often whether to stop; by default a flag that SIGINT and SIGTERM raise.
-        predictor_sha256: digest of the predictor that it plans with, told to the others.
+    `stopped` is asked often whether to stop; by default it is a flag that SIGINT and SIGTERM raise.
+    The digest of the predictor is told to the others.
 
     Raises:
         BusError: the bus cannot be opened, or the team is not complete in time.

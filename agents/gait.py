@@ -37,14 +37,10 @@ def scheduled_stance(config: Config, index: int, ticks: NDArray[np.int64]) -> ND
 
 
 def nominal_forces(stance: NDArray[np.bool_], weight: float) -> Array:
-    """Forces that carry the robot's weight evenly on its stance feet (the paper's u_des).
+    """Forces that carry the robot's weight, m g, evenly on its stance feet (the paper's u_des).
 
-    Args:
-        stance: scheduled stance, shape (..., 4).
-        weight: of the robot, m g, N.
-
-    Returns:
-        Shape (..., 12): per leg (0, 0, m g / N_c) for stance legs and zero for swing legs, N.
+    Shape (..., 12), of a scheduled stance (..., 4): per leg (0, 0, m g / N_c) for stance legs and
+    zero for swing legs, N.
     """
     forces: Array = nominal_table(weight)[stance @ _BITS]
     return forces
@@ -125,12 +121,7 @@ def place_in(cycle: range, step: int) -> int:
 
 
 def first_step(config: Config, begun: int = 0) -> int:
-    """The team's first planning step: it walks, and all windows can be complete.
-
-    Args:
-        config: the team's configuration.
-        begun: tick at which the first sample begins.
-    """
+    """The team's first planning step: it walks, and all windows that begin at a tick are whole."""
     samples = config.planner.T_ini + config.planner.applied
     ready_ms = max(config.gait.stand_ms, begun + SAMPLE_MS * samples)
     return -(-ready_ms // step_ms(config))

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 from quadriga.agents.gait import step_ms
+from quadriga.agents.planner.peers import order_of as order_of
 from quadriga.agents.planning.interface import NOTHING, Expected
 from quadriga.agents.planning.references import AHEAD_MS
 from quadriga.agents.plausibility import (
@@ -60,10 +61,7 @@ class Inbox:
     agent knows at a tick does not depend on who was faster. In real time all that has come is
     handed over.
 
-    Args:
-        config: the team's configuration.
-        robot: the agent's robot.
-        peers: robots whose plans and measurements matter to it.
+    Plans and measurements of `peers` matter to it.
 
     Attributes:
         topics: row of the table and sender of every key that it subscribes to.
@@ -281,10 +279,8 @@ class Inbox:
         missing or came too late for the step that expected it, when a state was passed over, once a
         valid message was refused, and for every message that no rule expects.
 
-        Args:
-            last: tick of the step before, −1 before the first.
-            inputs: what this step took in; nothing has been taken in since.
-            expected: what it expected.
+        `last` is the tick of the step before, −1 before the first. Nothing has been taken in since
+        the `inputs` of this one.
         """
         tick = inputs.state.tick
         if tick == last + 1 and expected is NOTHING and inputs.bare:
@@ -329,11 +325,6 @@ def decode_packet(topic: Topic, payload: bytes) -> Message | None:
         return decode(payload, topic.type)
     except MessageError:
         return EStop(0, 0, UNREADABLE) if topic is ESTOP else None
-
-
-def order_of(message: Message) -> Order:
-    """Where a message stands among those of its source: by tick, or by step and exchange."""
-    return message.serial if isinstance(message, Plan) else (message.tick, 0)
 
 
 def has_rule(source: Source, order: Order) -> bool:

@@ -116,13 +116,7 @@ class Validator:
         validate_rows(_first(np.zeros(_N_STATE)), np.zeros(_N_STATE), self.lower, self.upper, 1e-3)
 
     def step(self, memory: Array | None, state: State, dt: float) -> Validated:
-        """Check the readings of a tick.
-
-        Args:
-            memory: of the tick before; None: there was none.
-            state: what was read.
-            dt: time since the last reading, s.
-        """
+        """Check the readings of a tick, `dt` s after the last one, which left `memory`."""
         row = _first(state.row) if memory is None else memory.copy()
         if validate_rows(row, state.row, self.lower, self.upper, dt):
             return Validated(row, state, imu=False, encoders=(), lost="")

@@ -130,9 +130,10 @@ def trunk_feedback(state: np.record, command: np.record, gains: np.record) -> Ar
 
     vx, vy = command.vx, command.vy
     state.v_des[0], state.v_des[1] = c * vx - s * vy, s * vx + c * vy
+    ahead, aside = c * velocity[0] + s * velocity[1], -s * velocity[0] + c * velocity[1]
     integral, position = state.speed_integral, state.position_error
     for axis in range(2):
-        error = (vx if axis == 0 else vy) - state.outputs[1 + axis]
+        error = vx - ahead if axis == 0 else vy - aside
         lasting, led = (1.0 - dt / LEAK) * integral[axis] + dt * error, position[axis] + dt * error
         integral[axis] = min(_SPEED_LIMIT, max(-_SPEED_LIMIT, lasting))
         position[axis] = min(POSITION_LIMIT, max(-POSITION_LIMIT, led))

@@ -26,9 +26,7 @@ from quadriga.shared.messages import State, Truth
 from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.jit import compiled
 
-_Q_JOINT, _V_JOINT, _TAU_JOINT = (State.CUTS[k] for k in ("q_joint", "v_joint", "tau_joint"))
-_QUAT, _GYRO, _ACCEL = (State.CUTS[k] for k in ("imu_quat_wxyz", "imu_gyro", "imu_accel"))
-_FOOT_FORCE = State.CUTS["foot_force"]
+_SENSED: Final = slice(RobotState.CUTS["q_joint"][0].start, RobotState.CUTS["foot_counts"][0].stop)
 NO_TRUTH: Final = np.empty(0)  # for the truth that is not known
 
 
@@ -98,10 +96,7 @@ def estimate_rows(
     state.stance[:], state.progress = schedule[:4], schedule[4]
     state.switched = 1.0 if schedule[5] != state.half_cycle else 0.0
     state.half_cycle = schedule[5]
-    state.q_joint[:], state.v_joint[:] = readings[_Q_JOINT], readings[_V_JOINT]
-    state.tau_joint[:], state.quat_wxyz[:] = readings[_TAU_JOINT], readings[_QUAT]
-    state.omega[:], state.accel[:] = readings[_GYRO], readings[_ACCEL]
-    state.foot_counts[:] = readings[_FOOT_FORCE]
+    after[_SENSED] = readings
     if len(truth) > 0:
         _take_truth(state, gains, truth)
     else:

@@ -194,14 +194,10 @@ class LegState(NamedTuple):
 
 @compiled
 def leg_state(links: Array, q: Array, rates: Array, trunk: Spatial, gravity: Spatial) -> LegState:
-    """The state of a leg.
+    """The state of a leg at joint angles q, (3,), rad, and rates, (3,), rad/s.
 
-    Args:
-        links: its rows of `link_table`, (3, 14).
-        q: its joint angles, (3,), rad.
-        rates: its joint rates, (3,), rad/s.
-        trunk: motion of the trunk.
-        gravity: the acceleration that stands for it.
+    `links` are its rows of `link_table`, (3, 14), `trunk` is the trunk's motion, `gravity` the
+    acceleration that stands for gravity.
     """
     # Places and axes of the links; their joints turn about x, y and y.
     c, s = np.cos(q[0]), np.sin(q[0])
@@ -278,13 +274,9 @@ def reaction_torques(
 ) -> tuple[Array, Array]:
     """Torques M q̈ + h − τ = Jᵀ f that the ground's forces have in the joints.
 
-    The trunk's angular acceleration is left out: no sensor measures it.
-
-    Args:
-        state: `ROBOT_STATE`, of which q_joint, v_joint, tau_joint and omega are read.
-        acceleration: q̈ of the joints, (12,), rad/s².
-        specific_force: of the trunk's origin, (3,), m/s², trunk frame: gravity and acceleration.
-        links: `link_table`.
+    The trunk's angular acceleration is left out: no sensor measures it. `acceleration` is q̈,
+    (12,), rad/s², `specific_force` that of the trunk's origin, (3,), m/s², trunk frame, with
+    gravity.
 
     Returns:
         h − τ and M q̈, (12,) each, N·m.
@@ -309,14 +301,10 @@ def reaction_torques(
 
 @compiled
 def foot_forces(torques: Array, q_joint: Array, geometry: Geometry | np.record) -> Array:
-    """Forces f on the feet's centres with Jᵀ f = `torques`, (4, 3), N, trunk frame.
+    """Forces f on the feet's centres with Jᵀ f = `torques`, (12,), N·m; (4, 3), N, trunk frame.
 
-    Zero for a leg that is stretched so far that its torques do not tell the force.
-
-    Args:
-        torques: `reaction_torques`, (12,), N·m.
-        q_joint: joint angles, (12,), rad.
-        geometry: of the legs, or `GAINS`.
+    Joint angles are (12,), rad. Zero for a leg that is stretched so far that its torques do not
+    tell the force.
     """
     out, link = np.zeros((4, 3)), geometry.link
     for leg in range(4):
@@ -359,12 +347,9 @@ class RigidBodyTerms(NamedTuple):
 
 @compiled
 def rigid_body_terms(q: Array, v: Array, links: Array) -> RigidBodyTerms:
-    """The terms of the equation of motion.
+    """The terms of the equation of motion, by Pinocchio's configuration and velocity.
 
-    Args:
-        q: Pinocchio's configuration, (19,), its quaternion normalised.
-        v: Pinocchio's velocity, (18,).
-        links: `link_table`.
+    q is (19,), its quaternion normalised, v is (18,).
     """
     M_inverse, nle = np.zeros((18, 18)), np.empty(18)
     J, dJ = np.empty((6, 18)), np.empty((6, 18))

@@ -100,9 +100,7 @@ def minimise(qp: ForceQp, f: Array) -> Minimum:
     if inside:
         return Minimum(free, nothing, Residuals(exact, 0.0, 0.0), 0)
     solutions = _MOST if np.isfinite(np.dot(f, f)) else 0
-    metric = np.empty(nv)
-    for i in range(nv):
-        metric[i] = -_STEP * minus_inverse[i, i]
+    metric = -_STEP * np.diag(minus_inverse)
     faces = _Faces(np.zeros(nv), np.zeros(nv, dtype=np.bool_), np.zeros(nv))
     v, gradient = free, np.zeros(nv)
     for solution in range(solutions):
@@ -112,9 +110,7 @@ def minimise(qp: ForceQp, f: Array) -> Minimum:
             if is_optimal(found.residuals):
                 return found
             break
-        count = 0
-        for i in range(nv):
-            count += faces.fixed[i]
+        count = int(np.count_nonzero(faces.fixed))
         if 2 * count <= nv:
             v, gradient = _pull_back(minus_inverse, free, faces, count)
         else:
@@ -288,12 +284,12 @@ def _with_proof(qp: ForceQp, f: Array, v: Array, faces: _Faces, solutions: int) 
         height, reach = value[i + 2], upper[row] + slope * value[i + 2]
         # Held where the pyramid reaches the box: its sides bear what z asks for, the box the rest.
         jump = fixed[i + 2] and lower[i + 2] < height < upper[i + 2]
-        x, y = -(Hv[i] + f[i]), -(Hv[i + 1] + f[i + 1])
+        x, y, z = -(Hv[i] + f[i]), -(Hv[i + 1] + f[i + 1]), -(Hv[i + 2] + f[i + 2])
         x_jumps = jump and fixed[i] and abs(reach - upper[i]) <= _CLOSE
         y_jumps = jump and fixed[i + 1] and abs(reach - upper[i + 1]) <= _CLOSE
         x_side = abs(x) if tilt[i] != 0.0 and not x_jumps else 0.0
         y_side = abs(y) if tilt[i + 1] != 0.0 and not y_jumps else 0.0
-        z = -(Hv[i + 2] + f[i + 2]) + slope * (x_side + y_side)
+        z += slope * (x_side + y_side)
         if x_jumps:
             x_side = min(abs(x), max(0.0, -z / slope))
             z += slope * x_side

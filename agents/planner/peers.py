@@ -36,7 +36,7 @@ from quadriga.agents.planner.qp import stance_columns
 from quadriga.agents.plausibility import is_plausible
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config
-from quadriga.shared.messages import Measurement, Plan
+from quadriga.shared.messages import Measurement, Message, Plan
 from quadriga.shared.robots.conventions import N_FORCES, N_OUTPUTS, Array, robot_names
 from quadriga.shared.runtime.record import record
 from quadriga.shared.topics import MEASUREMENT, SAMPLE_MS
@@ -118,15 +118,9 @@ class PeerTerms:
 
 
 class Neighbours:
-    """The delay protocol of one agent; holds no state beyond its configuration.
+    """The delay protocol of agent `index`, 0-based; holds no state beyond its configuration.
 
-    Args:
-        config: the team's configuration.
-        index: this agent's place in the team, 0-based.
-        peers: places of the robots that matter to it; None: all others.
-
-    Attributes:
-        names: of these robots.
+    `peers` are the places of the robots that matter to it, None: all others; `names` their names.
     """
 
     def __init__(self, config: Config, index: int, peers: frozenset[int] | None = None) -> None:
@@ -277,27 +271,19 @@ class Neighbours:
         newest = last * self._step_ms
         measured = {sample.tick - SAMPLE_MS: sample for sample in samples if sample.tick <= newest}
         stance = scheduled_stance(self._config, index, starts)
-        known = np.ones(T_ini, dtype=np.bool_)
+        known = np.zeros(T_ini, dtype=np.bool_)
         u, y = np.zeros((T_ini, N_FORCES)), np.zeros((T_ini, N_OUTPUTS))
         for k, start in enumerate(starts.tolist()):
             if (sample := measured.get(start)) is not None:
-                stance[k], u[k], y[k] = sample.stance > 0.5, sample.u, sample.y
-            elif (planned := _plan_at(plans, start)) is not None:
-                u[k], y[k] = planned
-            else:
-                known[k] = False
+                known[k], stance[k], u[k], y[k] = True, sample.stance > 0.5, sample.u, sample.y
+                continue
+            for plan in plans:  # the newest that has this sample counts
+                ahead = (start - plan.tick) // SAMPLE_MS
+                if 0 <= ahead < len(plan.u):
+                    known[k], u[k], y[k] = True, plan.u[ahead], plan.y[ahead]
         du = u - nominal_forces(stance, weight)
         du[~known] = 0.0
         return known, du, y
-
-
-def _plan_at(plans: tuple[Plan, ...], start: int) -> tuple[Array, Array] | None:
-    """Forces and outputs that the newest plan has for the sample which begins at a tick."""
-    for plan in reversed(plans):
-        ahead = (start - plan.tick) // SAMPLE_MS
-        if 0 <= ahead < len(plan.u):
-            return plan.u[ahead], plan.y[ahead]
-    return None
 
 
 def _stands(sample: Measurement) -> bool:
@@ -305,15 +291,15 @@ def _stands(sample: Measurement) -> bool:
     return bool((sample.stance > 0.5).all())
 
 
-def _order(message: Measurement | Plan) -> tuple[int, int]:
-    """What messages of a kind are sorted by."""
+def order_of(message: Message) -> tuple[int, int]:
+    """Where a message stands among those of its source: by tick, or by step and exchange."""
     return message.serial if isinstance(message, Plan) else (message.tick, 0)
 
 
 def _insert(held: tuple[M, ...], new: M, oldest: int) -> tuple[M, ...]:
     """`held` with `new` sorted in, without what is older; `held` itself if it has `new` already."""
-    place = bisect_left(held, _order(new), key=_order)
-    if place < len(held) and _order(held[place]) == _order(new):
+    place = bisect_left(held, order_of(new), key=order_of)
+    if place < len(held) and order_of(held[place]) == order_of(new):
         return held
     kept = [item for item in held[:place] if item.tick >= oldest]
     return (*kept, new, *held[place:])
@@ -344,13 +330,10 @@ class Peers:
     def terms(
         self, peers: tuple[PeerData, ...], step: int, window_step: int, y_base: Array
     ) -> PeerTerms:
-        """The peers' terms of eq. 11 for planning step `step`.
+        """The terms of eq. 11 of the peers of `Neighbours.select` for planning step `step`.
 
-        Args:
-            peers: see `Neighbours.select`.
-            step: chooses the transition matrix.
-            window_step: planning step at which the peers' windows end.
-            y_base: base of the outputs at the ends of the windows' samples, (T_ini, 6).
+        Their windows end at `window_step`; `y_base` is the base of the outputs at the ends of the
+        windows' samples, (T_ini, 6).
         """
         if not peers:
             return PeerTerms()
@@ -392,9 +375,7 @@ def couple(
 ) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
     """Places, (c,), in all peers' z = [u_ini; y_ini; u], and the columns of G there, (rows, c).
 
-    Args:
-        G: of each peer, (rows, 18 T_ini + 12 N).
-        stance: of each peer over its plan, (N, 4).
+    G is (rows, 18 T_ini + 12 N) of each peer, its stance over its plan (N, 4).
     """
     columns, rows = [np.zeros(0, dtype=np.int64)], [np.zeros((len(G[0]) if len(G) else 0, 0))]
     for i, (block, legs) in enumerate(zip(G, stance, strict=True)):

@@ -154,13 +154,7 @@ class Planner:
     def step(
         self, state: PlannerState, inputs: PlannerInputs, peers: PeerTerms
     ) -> tuple[PlannerState, PlanResult]:
-        """Plan the horizon of one planning step, or plan it again with the peers' newer terms.
-
-        Args:
-            state: the last plan.
-            inputs: the agent's own data.
-            peers: the peers' terms of eq. 11.
-        """
+        """Plan the horizon of one planning step, or plan it again with the peers' newer terms."""
         result, _ = self._solve(state, inputs, peers, as_qp=False)
         return PlannerState(inputs.step, result.du, result.y), result
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from itertools import product
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -144,10 +144,12 @@ class Provenance:
         Raises:
             TypeError, KeyError: fields are missing.
         """
-        gates = {name: as_tuples(value) for name, value in body["gates"].items()}
-        gates["harm"] = {name: Bounds(*three) for name, three in gates["harm"].items()}
+        given = body["gates"]
+        names = {each.name for each in fields(GateReport)} & given.keys()
+        known = {name: as_tuples(given[name]) for name in names}
+        known["harm"] = {name: Bounds(*three) for name, three in given.get("harm", {}).items()}
         whole = {name: as_tuples(value) for name, value in body.items()}
-        return cls(**whole | {"gates": GateReport(**gates)})
+        return cls(**whole | {"gates": GateReport(**known)})
 
 
 def radius_limit(config: Config) -> float:

@@ -362,12 +362,8 @@ def spread_over_samples(g: Array, hold: int, angle_step: float) -> Array:
     """Responses h to single samples that add up to the responses g to S samples in a row.
 
     g_l(θ) = Σ_m h_{l−m}(θ + m δ), m = 0 … S − 1: linear in the polynomials' coefficients. What it
-    leaves open is chosen smooth in the lag.
-
-    Args:
-        g: coefficients of the response to a held draw, (2 DEGREE + 2, N, …).
-        hold: S.
-        angle_step: δ, what the phase advances in a sample, rad.
+    leaves open is chosen smooth in the lag. The coefficients of g are (2 DEGREE + 2, N, …), `hold`
+    is S, `angle_step` δ, what the phase advances in a sample, rad.
     """
     if hold == 1:
         return g
@@ -398,12 +394,8 @@ def shrink(estimate: Array, without: Array) -> Array:
     max(0, 1 − v/|x̂|²) (James and Stein). A peer's effect on an output as a whole is left out if it
     is not significant, or small against the agent's own.
 
-    Args:
-        estimate: from all data, (k, N, n pushing, w, n responding, p).
-        without: from all folds but one, (F, k, N, n, w, n, p).
-
-    Returns:
-        The response, of the shape of `estimate`.
+    `estimate` is from all data, (k, N, n pushing, w, n responding, p), like the response, `without`
+    from all folds but one, (F, k, N, n, w, n, p).
     """
     F, n = len(without), estimate.shape[2]
     deviation = without - without.mean(axis=0)
@@ -444,13 +436,12 @@ def fit_free(walks: Sequence[_Walk], h: Array, layout: Layout) -> Array:
     x = np.zeros((n, p, waves * n * width, N))
     for i, members in enumerate(layout.members):
         own, every = np.flatnonzero(agent == i), np.flatnonzero(np.isin(agent, members))
-        with_peers = [(every, on_peers) for on_peers in _ON_PEERS if len(members) > 1]
+        choices = [(own, 1.0), *((every, on_peers) for on_peers in _ON_PEERS if len(members) > 1)]
         candidates = []
-        for columns, on_peers in ((own, 1.0), *with_peers):
+        for (columns, on_peers), ridge, on_harmonics in product(choices, _RIDGES, _ON_HARMONICS):
             scale = np.where(agent[columns] == i, 1.0, on_peers)
-            for ridge, on_harmonics in product(_RIDGES, _ON_HARMONICS):
-                penalty = ridge * np.where(wave[columns] > 0, on_harmonics, 1.0) * scale
-                candidates.append((columns, penalty))
+            penalty = ridge * np.where(wave[columns] > 0, on_harmonics, 1.0) * scale
+            candidates.append((columns, penalty))
         best = np.zeros(p, dtype=np.int64)
         if len(sums) == 2:
             best = _choose_penalties(sums[0], sums[1], i, candidates)
