@@ -38,15 +38,11 @@ def estimate(
     gains: Array,
     truth: Array | None = None,
 ) -> RobotState:
-    """A robot's state at a tick.
+    """A robot's state at a tick, `dt` s after the last one.
 
-    Args:
-        before: at the last tick, after `control`; None: it stands still at the origin.
-        sensors: what it measures.
-        schedule: a row of `Gait`.
-        dt: time since the last tick, s.
-        gains: `gains_row`.
-        truth: `truth_row`, to take for the filter's estimate, for comparison with it.
+    `before` is the state after `control` then; None: the robot stands still at the origin.
+    `schedule` is a row of `Gait`, `gains` a `gains_row`, `truth` a `truth_row` to take for the
+    filter's estimate, for comparison with it.
     """
     row = np.empty(ROBOT_STATE.itemsize // 8)
     row0 = standing_state(sensors, gains).row if before is None else before.row

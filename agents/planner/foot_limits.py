@@ -214,12 +214,7 @@ def _pull_back(minus_inverse: Array, free: Array, faces: _Faces, count: int) -> 
                 off[k] -= tilt[i] * free[foot + 2]
             k += 1
     # The rows are the negative normals, and so is the inverse: their product is positive definite.
-    gram = _gram(minus_inverse, rows, places, -1.0)
-    _solve(gram, off)
-    gradient = np.zeros(nv)
-    for k in range(count):
-        for axis in range(3):
-            gradient[places[k] + axis] += rows[k, axis] * off[k]
+    gradient = _solve_on_rows(minus_inverse, rows, places, -1.0, off)
     return free - minus_inverse @ gradient, gradient
 
 
@@ -247,17 +242,15 @@ def _move_along(H: Array, f: Array, faces: _Faces, count: int) -> tuple[Array, A
                     rows[k, j] = tilt[foot + j]
                     w[k] -= tilt[foot + j] * gradient[foot + j]
             k += 1
-    _solve(_gram(H, rows, places, 1.0), w)
-    moved = np.zeros(nv)
-    for k in range(count):
-        for axis in range(3):
-            moved[places[k] + axis] += rows[k, axis] * w[k]
+    moved = _solve_on_rows(H, rows, places, 1.0, w)
     return v + moved, gradient + H @ moved
 
 
 @compiled
-def _gram(K: Array, rows: Array, places: NDArray[np.int64], sign: float) -> Array:
-    """The upper triangle of sign · R K Rᵀ; row k of R has `rows[k]` from `places[k]` on."""
+def _solve_on_rows(
+    K: Array, rows: Array, places: NDArray[np.int64], sign: float, x: Array
+) -> Array:
+    """Rᵀ (sign · R K Rᵀ)⁻¹ x; row k of R has `rows[k]` from `places[k]` on. Replaces x."""
     count, row = len(places), np.empty(len(K))
     gram = np.zeros((count, count))
     for a in range(count):
@@ -269,7 +262,12 @@ def _gram(K: Array, rows: Array, places: NDArray[np.int64], sign: float) -> Arra
         for b in range(a, count):
             at = places[b]
             gram[a, b] = rows[b, 0] * row[at] + rows[b, 1] * row[at + 1] + rows[b, 2] * row[at + 2]
-    return gram
+    _solve(gram, x)
+    out = np.zeros(len(K))
+    for k in range(count):
+        for axis in range(3):
+            out[places[k] + axis] += rows[k, axis] * x[k]
+    return out
 
 
 @compiled

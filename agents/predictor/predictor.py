@@ -285,12 +285,8 @@ def fit(
     - periodic: a function of the phase in which no input acts backwards, see `periodic`; of a team
       that of the gait, with peers by their net wrench.
 
-    Args:
-        episodes: of the plant.
-        meta: what is fitted.
-        wrench: of `periodic`, from an agent's inputs to what they act by, (w, m); None: of the
-            robot.
-        response: of `periodic`, what stands for a fitted one, see `fit_periodic`.
+    Of `periodic` are `wrench`, from an agent's inputs to what they act by, (w, m), None: of the
+    robot, and `response`, which stands for a fitted one, see `fit_periodic`.
 
     Raises:
         PredictorError: no data, too little, of another plant, or a singular problem.
