@@ -105,8 +105,6 @@ class Agent:
     """Fixed data of one robot's agent; `step` is a function of state and inputs alone.
 
     Args:
-        config: the team's configuration.
-        robot: the robot's name, r1 … rn.
         predictor: the fitted predictor; None: without one, on nominal forces or on the plans of a
             central planner.
         clock_ns: read around the planner for `Outputs.planner_ns`; nothing else depends on it.
@@ -144,8 +142,6 @@ class Agent:
         # Planned height and tilt are in general not tracked: the reference would follow the error.
         self._tracks_all = not self._feedforward and config.planner.tracked == "outputs"
         self.fallen_cosine = math.cos(config.controller.fall_tilt)
-        self._damping = config.controller.damping
-        self._max_failures = config.controller.max_failures
 
     @property
     def peers(self) -> tuple[str, ...]:
@@ -204,8 +200,7 @@ class Agent:
         A row of `trunk.COMMAND`.
         """
         reference, _ = reference_at(state.references, tick, self._height)
-        setpoint = setpoint_at(state.plans, tick)
-        asked = self._trunk_command(tick, state.mode, reference, setpoint, None)
+        asked = self._trunk_command(tick, state.mode, reference, setpoint_at(state.plans, tick))
         begins = (*(plan.start for plan in state.plans), *(r.tick for r in state.references))
         change = min((begin for begin in begins if begin > tick), default=tick + SAMPLE_MS)
         new_sample = tick % SAMPLE_MS == 0
@@ -268,13 +263,15 @@ class Agent:
             # A plan that takes effect later changes nothing now, not even one that is refused.
             at_once = self.plans_at_once or mode.name != WALK
             setpoint = setpoint_at(plans if at_once else state.plans, tick)
-            trunk = self._trunk_command(tick, mode, reference, setpoint, inputs.excitation)
+            if inputs.excitation is not None:
+                setpoint = Setpoint(setpoint.deviation + inputs.excitation, setpoint.y_ref)
+            trunk = self._trunk_command(tick, mode, reference, setpoint)
             new_sample = tick // SAMPLE_MS != state.tick // SAMPLE_MS
             controlled, solution = control(robot, trunk, self.gains, new_sample=new_sample)
         else:
             controlled, solution = acted.controlled, acted.solution
         failures = 0 if solution.solved else state.failures + 1
-        if failures >= self._max_failures:
+        if failures >= self.config.controller.max_failures:
             stops.append(Stop(PASSIVE, f"qp-{solution.status}"))
 
         mode = resolve_stops(mode, tick, stops)
@@ -362,21 +359,15 @@ class Agent:
         begun = tick - SAMPLE_MS
         if tick % SAMPLE_MS or begun < 0 or begun > state.tick:
             return None
+        u = robot.force_sum / max(1.0, robot.force_count)
         stance = self.gait.at(begun, state.mode)[:4]
-        return Measurement(tick, tick * 1_000_000, robot.mean_planned_force, robot.outputs, stance)
+        return Measurement(tick, tick * 1_000_000, u, robot.outputs, stance)
 
     def _trunk_command(
-        self,
-        tick: int,
-        mode: Mode,
-        reference: Reference,
-        setpoint: Setpoint,
-        excitation: Array | None,
+        self, tick: int, mode: Mode, reference: Reference, setpoint: Setpoint
     ) -> TrunkCommand:
         """What the controller is asked: the reference, with what the plan in force says of it."""
-        deviation, planned = setpoint.deviation, setpoint.y_ref
-        if excitation is not None:
-            deviation = deviation + excitation
+        deviation, planned = setpoint
         if mode.name != WALK:
             deviation = np.zeros(12)
         share = mode.speed_factor(tick)
@@ -392,7 +383,7 @@ class Agent:
         """The motor command: torques, with damping where they are not this tick's, or damping."""
         row = np.zeros(60)
         if mode.passive or not solved:
-            row[Command.CUTS["kd"]] = self._damping
+            row[Command.CUTS["kd"]] = self.config.controller.damping
         if not mode.passive:
             row[Command.CUTS["tau"]] = tau
         return Command.from_row(tick, tick * 1_000_000, row)

@@ -42,11 +42,8 @@ def run(
 ) -> None:
     """Plan for the whole team until the walk ends or it is stopped.
 
-    Args:
-        config: the team's configuration.
-        planner: the team's planner.
-        stopped: asked often whether to stop; by default a flag that SIGINT and SIGTERM raise.
-        predictor_sha256: digest of the predictor that it plans with, told to the others.
+    `stopped` is asked often whether to stop; by default it is a flag that SIGINT and SIGTERM raise.
+    The digest of the predictor is told to the others.
 
     Raises:
         BusError: the bus cannot be opened, or the team is not complete in time.
@@ -143,7 +140,6 @@ class _CentralShell:
             self._counters[f"plan_{code_of(plan.status)}"] += 1
         if state.refused:
             self._counters[REFUSED] = state.refused
-        took, none = np.array([1e-6 * outputs.planner_ns]), np.zeros(0)
-        counters = dict(self._counters)
-        status = Status(plan.tick, plan.stamp_ns, "plan", "", "", {}, counters, took, none)
+        took, counters = np.array([1e-6 * outputs.planner_ns]), dict(self._counters)
+        status = Status(plan.tick, plan.stamp_ns, "plan", "", "", {}, counters, took, np.zeros(0))
         self._put[""](encode(status))

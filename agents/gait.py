@@ -37,14 +37,10 @@ def scheduled_stance(config: Config, index: int, ticks: NDArray[np.int64]) -> ND
 
 
 def nominal_forces(stance: NDArray[np.bool_], weight: float) -> Array:
-    """Forces that carry the robot's weight evenly on its stance feet (the paper's u_des).
+    """Forces that carry the robot's weight, m g, evenly on its stance feet (the paper's u_des).
 
-    Args:
-        stance: scheduled stance, shape (..., 4).
-        weight: of the robot, m g, N.
-
-    Returns:
-        Shape (..., 12): per leg (0, 0, m g / N_c) for stance legs and zero for swing legs, N.
+    Shape (..., 12), of a scheduled stance (..., 4): per leg (0, 0, m g / N_c) for stance legs and
+    zero for swing legs, N.
     """
     forces: Array = nominal_table(weight)[stance @ _BITS]
     return forces
@@ -52,26 +48,16 @@ def nominal_forces(stance: NDArray[np.bool_], weight: float) -> Array:
 
 @lru_cache
 def nominal_table(weight: float) -> Array:
-    """Nominal forces of all 16 stance patterns, by the bits of the legs. Shape (16, 12), N.
-
-    Args:
-        weight: of the robot, m g, N.
-    """
+    """Nominal forces of all 16 stance patterns, by the bits of the legs. Shape (16, 12), N."""
     stance = np.arange(16)[:, None] & _BITS > 0
-    forces = np.zeros((16, N_LEGS, 3))
-    forces[..., 2] = stance * weight / np.maximum(stance.sum(axis=1), 1)[:, None]
-    table = forces.reshape(16, 3 * N_LEGS)
+    table = np.zeros((16, 3 * N_LEGS))
+    table[:, 2::3] = stance * weight / np.maximum(stance.sum(axis=1), 1)[:, None]
     table.setflags(write=False)
     return table
 
 
 class Gait:
-    """One robot's gait, looked up at each tick.
-
-    Args:
-        config: the team's configuration.
-        index: the robot's place in the team, 0-based.
-    """
+    """The gait of robot `index` (0-based), looked up at each tick."""
 
     def __init__(self, config: Config, index: int) -> None:
         stance_ms, self._stand_ms = config.gait.stance_ms, config.gait.stand_ms
@@ -135,12 +121,7 @@ def place_in(cycle: range, step: int) -> int:
 
 
 def first_step(config: Config, begun: int = 0) -> int:
-    """The team's first planning step: it walks, and all windows can be complete.
-
-    Args:
-        config: the team's configuration.
-        begun: tick at which the first sample begins.
-    """
+    """The team's first planning step: it walks, and all windows that begin at a tick are whole."""
     samples = config.planner.T_ini + config.planner.applied
     ready_ms = max(config.gait.stand_ms, begun + SAMPLE_MS * samples)
     return -(-ready_ms // step_ms(config))
@@ -151,8 +132,7 @@ def first_due_step(config: Config, since: int) -> int:
 
     Of one that begins in the midst of a walk none is due before its window is whole.
     """
-    first = first_step(config)
-    return max(first, first_step(config, since)) if since > config.gait.stand_ms else first
+    return first_step(config, since if since > config.gait.stand_ms else 0)
 
 
 def patience(config: Config) -> int:

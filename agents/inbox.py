@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 from quadriga.agents.gait import step_ms
+from quadriga.agents.planner.peers import order_of as order_of
 from quadriga.agents.planning.interface import NOTHING, Expected
 from quadriga.agents.planning.references import AHEAD_MS
 from quadriga.agents.plausibility import (
@@ -60,10 +61,7 @@ class Inbox:
     agent knows at a tick does not depend on who was faster. In real time all that has come is
     handed over.
 
-    Args:
-        config: the team's configuration.
-        robot: the agent's robot.
-        peers: robots whose plans and measurements matter to it.
+    Plans and measurements of `peers` matter to it.
 
     Attributes:
         topics: row of the table and sender of every key that it subscribes to.
@@ -126,14 +124,14 @@ class Inbox:
             return
         topic, sender = row
         message = decode_packet(topic, payload)
+        if isinstance(message, State):
+            self.take_state(message)
+            return
         if message is None or not self._is_believable(message):
             self.counters[f"dropped_{topic.name}"] += 1
             return
         source = (topic.name, sender)
-        if isinstance(message, State):
-            self._keep_newest(message)
-            return
-        elif topic in REQUESTS:
+        if topic in REQUESTS:
             # What is said may come twice; a release may end no stop that was pressed meanwhile.
             if topic is not RESET or message != self._released:
                 self._requests[topic.name] = message
@@ -142,7 +140,9 @@ class Inbox:
         elif isinstance(message, Event):
             if message.kind == "stop":
                 self._end, self.ended = min(message.tick, self._latest), True
-        elif self._tick_of(message) > self._latest:
+        elif self._latest < (
+            message.step * self._step_ms if isinstance(message, Plan) else message.tick
+        ):
             # It would be held until then, and real messages would be late behind it.
             self.counters[f"ahead_{topic.name}"] += 1
             self.refused = True
@@ -156,11 +156,19 @@ class Inbox:
         self.received[source] += 1
 
     def take_state(self, state: State) -> None:
-        """Take in a state that the plant link has brought."""
-        if is_measurable(state.row, self._measurable):
-            self._keep_newest(state)
-        else:
+        """Take in a state, if it is the newest and sensors can say it; see `agents.validate`."""
+        if not is_measurable(state.row, self._measurable):
             self.counters[f"dropped_{STATE.name}"] += 1
+            return
+        if state.tick <= self._newest_state:
+            self.counters["states_passed_over"] += 1
+            return
+        self.pass_state(state.tick)
+        passed, self._state = self._state, state
+        if passed is not None and passed.tick % SAMPLE_MS == 0:
+            passed, self._sample_end = self._sample_end, passed
+        if passed is not None:
+            self.counters["states_passed_over"] += 1
 
     def pass_state(self, tick: int) -> None:
         """Note a state that has been answered already."""
@@ -184,35 +192,18 @@ class Inbox:
         """The tick that nobody in the team can have passed."""
         return max(self._newest_state, 0) + AHEAD_MS
 
-    def _tick_of(self, message: Message) -> int:
-        return message.step * self._step_ms if isinstance(message, Plan) else message.tick
-
     def _is_believable(self, message: Message) -> bool:
         """Whether finite numbers can be meant, and for this robot.
 
-        Sensors must be able to say what a state says, references be within limits, and the truth be
-        of this robot and its orientation of unit length. Sensors may fail, see `agents.validate`.
+        References must be within limits, and the truth be of this robot and its orientation of unit
+        length.
         """
-        if isinstance(message, State):
-            return is_measurable(message.row, self._measurable)
         if isinstance(message, Truth):
             names, quats = message.robots, message.base_quat_wxyz
             if self._robot not in names or len(names) != len(quats):
                 return False
             return is_orientation(quats[names.index(self._robot)])
         return not isinstance(message, Reference) or is_within_limits(message)
-
-    def _keep_newest(self, state: State) -> None:
-        if state.tick <= self._newest_state:
-            self.counters["states_passed_over"] += 1
-            return
-        self._newest_state = state.tick
-        self.ended = self.ended and state.tick <= self._end + self._apart_ms
-        passed, self._state = self._state, state
-        if passed is not None and passed.tick % SAMPLE_MS == 0:
-            passed, self._sample_end = self._sample_end, passed
-        if passed is not None:
-            self.counters["states_passed_over"] += 1
 
     @property
     def has_state(self) -> bool:
@@ -288,10 +279,8 @@ class Inbox:
         missing or came too late for the step that expected it, when a state was passed over, once a
         valid message was refused, and for every message that no rule expects.
 
-        Args:
-            last: tick of the step before, −1 before the first.
-            inputs: what this step took in; nothing has been taken in since.
-            expected: what it expected.
+        `last` is the tick of the step before, −1 before the first. Nothing has been taken in since
+        the `inputs` of this one.
         """
         tick = inputs.state.tick
         if tick == last + 1 and expected is NOTHING and inputs.bare:
@@ -322,13 +311,12 @@ class Inbox:
 
 def _limits(tick: int, expected: Expected) -> dict[str, Order]:
     """The last message that the step of `tick` takes in, by the name of its topic."""
-    ticks = {
-        MEASUREMENT.name: expected.measurement_tick,
-        REFERENCE.name: expected.reference_tick,
-        TRUTH.name: tick if expected.truth else None,
-    }
     limits = {} if expected.plan is None else {PLAN.name: expected.plan}
-    return limits | {name: (last, 0) for name, last in ticks.items() if last is not None}
+    if expected.measurement_tick is not None:
+        limits[MEASUREMENT.name] = expected.measurement_tick, 0
+    if expected.reference_tick is not None:
+        limits[REFERENCE.name] = expected.reference_tick, 0
+    return limits | ({TRUTH.name: (tick, 0)} if expected.truth else {})
 
 
 def decode_packet(topic: Topic, payload: bytes) -> Message | None:
@@ -337,11 +325,6 @@ def decode_packet(topic: Topic, payload: bytes) -> Message | None:
         return decode(payload, topic.type)
     except MessageError:
         return EStop(0, 0, UNREADABLE) if topic is ESTOP else None
-
-
-def order_of(message: Message) -> Order:
-    """Where a message stands among those of its source: by tick, or by step and exchange."""
-    return message.serial if isinstance(message, Plan) else (message.tick, 0)
 
 
 def has_rule(source: Source, order: Order) -> bool:

@@ -75,12 +75,7 @@ Statuses = Mapping[str, Status]  # the newest of each other robot that has spoke
 
 
 class ModeRules:
-    """Fixed data of when one robot changes its mode; what it gives depends on arguments alone.
-
-    Args:
-        config: the team's configuration.
-        robot: the robot's name.
-    """
+    """Fixed data of when one robot changes its mode; what it gives depends on arguments alone."""
 
     def __init__(self, config: Config, robot: str) -> None:
         self._peers = tuple(n for n in robot_names(config.team.robots) if n != robot)
@@ -95,13 +90,11 @@ class ModeRules:
         """The mode if nothing stops the robot between the ticks `last` and `tick`."""
         if mode.name == WALK:
             return mode, resume
-        stance_ends = self._half_cycle(last) != self._half_cycle(tick)
+        before, now = ((t - self._stand_ms) // self._stance_ms for t in (last, tick))
+        stance_ends = before != now
         if stance_ends and self._can_resume(mode, resume, tick):
             return Mode(WALK, tick), replace(resume, resumed=tick)
         return next_mode(mode, tick, self._stand_ms, stance_ends), resume
-
-    def _half_cycle(self, tick: int) -> int:
-        return (tick - self._stand_ms) // self._stance_ms
 
     def _can_resume(self, mode: Mode, resume: ResumeState, tick: int) -> bool:
         if mode.name != STAND or not mode.may_resume or resume.inputs_ok_since < 0:
@@ -115,11 +108,7 @@ class ModeRules:
     ) -> list[Stop]:
         """What asks a robot to stop, of all that arrived, or did not.
 
-        Args:
-            mode: of the normal course.
-            inputs: of this tick.
-            statuses: of the others.
-            reference_age: of the operator's reference in force, ms.
+        `reference_age` is that of the operator's reference in force, ms.
         """
         stops = requested_stops(inputs)
         if mode.name != WALK:
@@ -141,10 +130,7 @@ class ModeRules:
     def peers_rest(self, statuses: Statuses, tick: int, since: int) -> bool:
         """Whether no other robot walks, as far as is known; after a while nobody is waited for.
 
-        Args:
-            statuses: of the others.
-            tick: the present one.
-            since: from when on they could be heard.
+        They could be heard from the tick `since` on.
         """
         recent = [s for s in statuses.values() if tick - s.tick <= SILENCE_MS and s.tick > since]
         if any(status.mode in (WALK, STOPPING) for status in recent):
@@ -157,22 +143,16 @@ class ModeRules:
         """What is remembered after a tick.
 
         Requests are sent several times, and may come late: one to go on that was made before a
-        stop, or at the same tick, counts no more.
-
-        Args:
-            resume: before it.
-            mode: after it.
-            inputs: of this tick.
-            inputs_ok: whether all inputs of a robot that stands are there. The time is counted
-                from the next half cycle, so that robots go on together.
+        stop, or at the same tick, counts no more. `mode` is that after the tick, and `inputs_ok`
+        whether all inputs of a robot that stands are there. The time is counted from the next half
+        cycle, so that robots go on together.
         """
         tick, stopped = inputs.state.tick, resume.stopped
         # Who did not know the time wrote 0; nobody can know one that is still to come.
         if inputs.stop is not None:
             stopped = max(stopped, min(inputs.stop.tick or tick, tick))
         if not mode.may_resume:
-            after = ResumeState(resumed=resume.resumed, stopped=stopped)
-            return resume if after == resume else after
+            return ResumeState(resumed=resume.resumed, stopped=stopped)
         since = -1
         if inputs_ok:
             next_half_cycle = tick + self._stance_ms - (tick - self._stand_ms) % self._stance_ms

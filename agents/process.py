@@ -32,12 +32,8 @@ def run(
 ) -> None:
     """Walk one robot until the walk ends or it is stopped.
 
-    Args:
-        config: the team's configuration.
-        robot: the robot's name, r1 … rn.
-        predictor: the fitted predictor; None walks on nominal forces.
-        stopped: asked often whether to stop; by default a flag that SIGINT and SIGTERM raise.
-        collected: reads the collected episodes, for agents that plan with them.
+    `stopped` is asked often whether to stop; by default it is a flag that SIGINT and SIGTERM raise.
+    For the others see `Agent`.
 
     Raises:
         BusError: as `answer_states`.

@@ -16,7 +16,7 @@ from quadriga.agents.validate import AGREES_MS, standing_torques
 from quadriga.shared.codec import decode, encode
 from quadriga.shared.config.sections import Config
 from quadriga.shared.messages import Measurement, Reference, State
-from quadriga.shared.robots.conventions import GRAVITY, N_JOINTS, N_LEGS, N_OUTPUTS, robot_names
+from quadriga.shared.robots.conventions import GRAVITY, N_LEGS, N_OUTPUTS, robot_names
 from quadriga.shared.robots.spec import RobotSpec
 from quadriga.shared.topics import REFERENCE_EPOCH_MS, SAMPLE_MS
 
@@ -67,19 +67,10 @@ def _stay(config: Config, tick: int = 0) -> Reference:
 
 def standing(robot: RobotSpec, tick: int, lean: float = 0.0) -> State:
     """What a robot that stands still on flat ground measures, or leans to its right, rad."""
-    zero, share = np.zeros(N_JOINTS), robot.weight / N_LEGS
-    still = State(
-        0,
-        0,
-        robot.q_stand,
-        zero,
-        standing_torques(robot),
-        np.zeros(4),
-        np.zeros(3),
-        np.array([0.0, 0.0, GRAVITY]),
-        np.full(N_LEGS, share),
-    )
-    return _at(still, tick, lean)
+    row, cuts = np.zeros(State.SIZE), State.CUTS
+    row[cuts["q_joint"]], row[cuts["tau_joint"]] = robot.q_stand, standing_torques(robot)
+    row[cuts["imu_accel"]], row[cuts["foot_force"]] = (0.0, 0.0, GRAVITY), robot.weight / N_LEGS
+    return _at(State.from_row(0, 0, row), tick, lean)
 
 
 def _at(still: State, tick: int, lean: float) -> State:

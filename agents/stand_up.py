@@ -58,11 +58,7 @@ class StandUp:
 
 
 class StandUpRules:
-    """Fixed data of how a robot stands up; what it gives depends on arguments alone.
-
-    Args:
-        config: the team's configuration.
-    """
+    """Fixed data of how a robot stands up; what it gives depends on arguments alone."""
 
     def __init__(self, config: Config) -> None:
         self._by_bridge = config.team.plant == BRIDGED  # which gets its robot up by itself
@@ -82,13 +78,7 @@ class StandUpRules:
     def step(
         self, mode: Mode, stand_up: StandUp | None, inputs: Inputs, *, may_move: bool
     ) -> tuple[Mode, StandUp | None, Command]:
-        """Stand up by a tick.
-
-        Args:
-            mode: before it.
-            stand_up: what is remembered; None: the robot begins at this tick.
-            inputs: of this tick.
-            may_move: whether the other robots rest.
+        """Stand up by a tick; with `stand_up` None the robot begins, it moves once others rest.
 
         Returns:
             The mode after it, what is to be remembered while the robot stands up, the command.
@@ -98,27 +88,22 @@ class StandUpRules:
             by = "" if inputs.reset is None else inputs.reset.by
             mode = Mode(STANDING_UP, tick, with_detail(RESET, by)[:REASON_MOST])
             stand_up = StandUp(state.q_joint)
-        stops = requested_stops(inputs)
-        if trouble := self._find_trouble(stand_up, state):
-            stops.append(Stop(PASSIVE, trouble))
+        stops, upright = requested_stops(inputs), _upright(state)
+        if not upright >= self._fallen_cosine:
+            stops.append(Stop(PASSIVE, NO_ESTIMATE if math.isnan(upright) else FALL))
+        elif self._since_motion(stand_up, tick) > _LATEST_MS:
+            stops.append(Stop(PASSIVE, NOT_UP))
         mode = resolve_stops(mode, tick, stops)
         if mode.passive:
             return mode, None, damp_joints(tick, self._damping)
         if stand_up.motion is None and may_move:
             stand_up = StandUp(stand_up.held, tick, way_up(state.q_joint, self._robot, _SECONDS))
         command = self._command(stand_up, state)
-        if self._since_motion(stand_up, tick) >= _SETTLE_MS and self._is_up(state):
+        settled = self._since_motion(stand_up, tick) >= _SETTLE_MS
+        near = (np.abs(state.q_joint - self._robot.q_stand) <= _OFF).all()
+        if settled and near and upright >= _LEVEL:
             return Mode(STAND, tick, mode.reason), None, command
         return mode, stand_up, command
-
-    def _find_trouble(self, stand_up: StandUp, state: State) -> str:
-        """Why a robot cannot stand up; "" if it can so far."""
-        cosine = _upright(state)
-        if math.isnan(cosine):
-            return NO_ESTIMATE
-        if cosine < self._fallen_cosine:
-            return FALL
-        return NOT_UP if self._since_motion(stand_up, state.tick) > _LATEST_MS else ""
 
     def _since_motion(self, stand_up: StandUp, tick: int) -> int:
         """For how long the motion has been over, ms; negative before."""
@@ -126,20 +111,14 @@ class StandUpRules:
             return -1
         return tick - stand_up.begun - round(1e3 * stand_up.motion.seconds)
 
-    def _is_up(self, state: State) -> bool:
-        """Whether the joints are at the stand, and the trunk is level."""
-        off = np.abs(state.q_joint - self._robot.q_stand)
-        return bool((off <= _OFF).all()) and _upright(state) >= _LEVEL
-
     def _command(self, stand_up: StandUp, state: State) -> Command:
         """The command that leads the joints, which motors follow by themselves."""
         q_des, v_des = stand_up.held, np.zeros(N_JOINTS)
         if stand_up.motion is not None:
             q_des, v_des = posture_at(stand_up.motion, 1e-3 * (state.tick - stand_up.begun))
-        off = np.clip(q_des - state.q_joint, -self._most_off, self._most_off)
+        q_des = state.q_joint + np.clip(q_des - state.q_joint, -self._most_off, self._most_off)
         kp, kd = np.full(N_JOINTS, self._kp), np.full(N_JOINTS, self._kd)
-        zero = np.zeros(N_JOINTS)
-        return Command(state.tick, state.stamp_ns, zero, state.q_joint + off, v_des, kp, kd)
+        return Command(state.tick, state.stamp_ns, np.zeros(N_JOINTS), q_des, v_des, kp, kd)
 
 
 def _upright(state: State) -> float:

@@ -17,15 +17,12 @@ _BIN_MS: Final = 0.02
 
 
 class Telemetry:
-    """Collects what the next status message says; one is due at 10 Hz and on change of mode."""
+    """Collects what the next status message says; one is due at 10 Hz and on change of mode.
+
+    The walk is `paced` in real time, so that it matters when a tick is answered, or not.
+    """
 
     def __init__(self, estimator: str, *, paced: bool = False) -> None:
-        """Begin.
-
-        Args:
-            estimator: its name.
-            paced: whether the walk is in real time, so that it matters when a tick is answered.
-        """
         self._estimator, self._paced = estimator, paced
         self._jitter = Histogram(_BIN_MS)
         self._newest_state = (-1, 0)  # tick and wall-clock time of the newest state

@@ -98,11 +98,7 @@ class Validated(NamedTuple):
 
 
 class Validator:
-    """Fixed data of how a robot's readings are checked, and of how it stands without some.
-
-    Args:
-        config: the team's configuration.
-        index: the robot's place in the team, 0-based.
+    """Fixed data of how readings of robot `index` (0-based) are checked, and how it stands without.
 
     Attributes:
         lower, upper: angles within which an encoder's reading can be, (12,), rad.
@@ -120,13 +116,7 @@ class Validator:
         validate_rows(_first(np.zeros(_N_STATE)), np.zeros(_N_STATE), self.lower, self.upper, 1e-3)
 
     def step(self, memory: Array | None, state: State, dt: float) -> Validated:
-        """Check the readings of a tick.
-
-        Args:
-            memory: of the tick before; None: there was none.
-            state: what was read.
-            dt: time since the last reading, s.
-        """
+        """Check the readings of a tick, `dt` s after the last one, which left `memory`."""
         row = _first(state.row) if memory is None else memory.copy()
         if validate_rows(row, state.row, self.lower, self.upper, dt):
             return Validated(row, state, imu=False, encoders=(), lost="")
@@ -139,15 +129,12 @@ class Validator:
         for joint in encoders:
             stands_in[_Q][joint], stands_in[_V][joint] = known.valid[_Q][joint], 0.0
         valid = State.from_row(state.tick, state.stamp_ns, stands_in)
-        return Validated(row, valid, imu, encoders, self._loss(known.missing))
-
-    def _loss(self, missing: Array) -> str:
-        """Why the robot can walk no more; "": it can."""
-        if missing[_IMU] > self._hold_ms:
-            return IMU_LOST
-        lost = np.flatnonzero(missing[:N_JOINTS] > self._hold_ms).tolist()
+        lost = [joint for joint in encoders if known.missing[joint] > self._hold_ms]
         names = ",".join(JOINT_NAMES[joint].removesuffix("_joint") for joint in lost)
-        return with_detail(ENCODER_LOST, names) if lost else ""
+        reason = with_detail(ENCODER_LOST, names) if lost else ""
+        if known.missing[_IMU] > self._hold_ms:
+            reason = IMU_LOST
+        return Validated(row, valid, imu, encoders, reason)
 
     def stand(self, since: Array | None, read: Validated) -> tuple[Array, Command]:
         """Stand without an attitude, or a joint's angle: the motors lead their joints to the stand.

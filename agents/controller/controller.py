@@ -39,13 +39,9 @@ _NUMBERS: Final = struct.Struct(f"={COMMAND.itemsize // 8 - N_FORCES}d")  # behi
 def control(
     state: RobotState, command: TrunkCommand, gains: Array, *, new_sample: bool = False
 ) -> tuple[RobotState, WholeBodySolution]:
-    """Torques for what a robot is asked to do.
+    """Torques for what a robot is asked to do, of its state by `estimate` and a `gains_row`.
 
-    Args:
-        state: of this tick, by `estimate`.
-        command: what is asked.
-        gains: `gains_row`.
-        new_sample: whether a sample of forces begins with this tick.
+    `new_sample` tells whether a sample of forces begins with this tick.
 
     Returns:
         The state to remember, with what the QP was asked for, and the QP with its answer.

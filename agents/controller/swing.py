@@ -77,8 +77,7 @@ def swing_accelerations(state: np.record, wz: float, gains: np.record) -> Array:
             reaction, reference[1, 2] = state.reaction[leg], _RETRACTION_SPEED
             plane = np.sqrt(reaction[0] ** 2 + reaction[1] ** 2)
             if plane > 1e-6:
-                reference[1, 0] = _BACK * _RETRACTION_SPEED * reaction[0] / plane
-                reference[1, 1] = _BACK * _RETRACTION_SPEED * reaction[1] / plane
+                reference[1, :2] = _BACK * _RETRACTION_SPEED * reaction[:2] / plane
         else:
             reference = _swing(state, wz, gains, leg)
         correction = gains.kp_swing * (reference[0] - position)

@@ -130,19 +130,15 @@ def trunk_feedback(state: np.record, command: np.record, gains: np.record) -> Ar
 
     vx, vy = command.vx, command.vy
     state.v_des[0], state.v_des[1] = c * vx - s * vy, s * vx + c * vy
-    error = np.array(
-        [vx - (c * velocity[0] + s * velocity[1]), vy - (-s * velocity[0] + c * velocity[1])]
-    )
+    ahead, aside = c * velocity[0] + s * velocity[1], -s * velocity[0] + c * velocity[1]
     integral, position = state.speed_integral, state.position_error
     for axis in range(2):
-        remaining = (1.0 - dt / LEAK) * integral[axis]
-        integral[axis] = min(_SPEED_LIMIT, max(-_SPEED_LIMIT, remaining + dt * error[axis]))
-        position[axis] = min(
-            POSITION_LIMIT, max(-POSITION_LIMIT, position[axis] + dt * error[axis])
-        )
-        in_plane[axis] = (
-            gains.kd_xy * error[axis] + gains.ki_xy * integral[axis] + gains.kp_xy * position[axis]
-        )
+        error = vx - ahead if axis == 0 else vy - aside
+        lasting, led = (1.0 - dt / LEAK) * integral[axis] + dt * error, position[axis] + dt * error
+        integral[axis] = min(_SPEED_LIMIT, max(-_SPEED_LIMIT, lasting))
+        position[axis] = min(POSITION_LIMIT, max(-POSITION_LIMIT, led))
+        in_plane[axis] = gains.kd_xy * error + gains.ki_xy * integral[axis]
+        in_plane[axis] += gains.kp_xy * position[axis]
     acc[0], acc[1] = c * in_plane[0] - s * in_plane[1], s * in_plane[0] + c * in_plane[1]
 
     # A robot that cannot turn must not be asked for a heading that goes round behind it.
@@ -152,10 +148,9 @@ def trunk_feedback(state: np.record, command: np.record, gains: np.record) -> Ar
     acc[5] = gains.kp_yaw * yaw_error + gains.kd_yaw * (command.wz - omega[2])
 
     # Tilt errors about the horizontal axes of the yaw frame, taken to the odometry frame.
-    roll = gains.kp_tilt * (command.roll - rpy[0]) - gains.kd_tilt * (c * omega[0] + s * omega[1])
-    pitch = gains.kp_tilt * (command.pitch - rpy[1]) - gains.kd_tilt * (
-        -s * omega[0] + c * omega[1]
-    )
+    about_x, about_y = c * omega[0] + s * omega[1], -s * omega[0] + c * omega[1]
+    roll = gains.kp_tilt * (command.roll - rpy[0]) - gains.kd_tilt * about_x
+    pitch = gains.kp_tilt * (command.pitch - rpy[1]) - gains.kd_tilt * about_y
     acc[3], acc[4] = c * roll - s * pitch, s * roll + c * pitch
     return acc
 

@@ -28,7 +28,6 @@ from quadriga.agents.estimator.rigid_body import (
     cholesky_solve,
     dot,
     product,
-    symmetrise,
     times,
 )
 from quadriga.agents.estimator.robot_state import RecordRow, cuts_of_record
@@ -260,7 +259,8 @@ def _fill_cost(qp: np.record, outputs: Array, f_des: Array, gains: np.record) ->
     for k in range(12):
         H[k, k] += gains.gamma_tau
         trace += H[k, k]
-    symmetrise(H)
+        for i in range(k):
+            H[i, k] = H[k, i]
     g = gains.gamma_force * times(A.T, a0 - f_des)
     g = g + gains.gamma_defect * times(W_B.T, W_b)
     scale = 12.0 / trace

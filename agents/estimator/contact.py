@@ -28,29 +28,18 @@ def update_contacts(state: np.record, gains: np.record) -> None:
     """Update contacts and ground heights from the foot loads and places of this tick."""
     rate = state.dt / (_GROUND_FILTER + state.dt)
     sole_z = state.p_foot[:, 2] - gains.foot_radius
-    if gains.contact_detection < 0.5:
-        _follow_schedule(state, sole_z, rate)
-        return
     for leg in range(4):
-        if state.stance[leg] > 0.5:
+        stands = state.stance[leg] > 0.5
+        if gains.contact_detection < 0.5:
+            # The paper's plain setting: contacts are the schedule's, the ground is flat and known.
+            state.contact[leg] = state.touchdown_seen[leg] = state.stance[leg]
+            state.early_contact[leg] = state.unloaded[leg] = 0.0
+            state.ground[leg] = sole_z[leg] if stands else state.ground[leg]
+        elif stands:
             _update_stance(state, gains, leg)
         else:
             _update_swing(state, gains, leg)
     _update_ground(state, sole_z, rate)
-
-
-@compiled
-def _follow_schedule(state: np.record, sole_z: Array, rate: float) -> None:
-    """The paper's plain setting: contacts are the schedule's, the ground is flat and known."""
-    total, count = 0.0, 0
-    for leg in range(4):
-        state.contact[leg] = state.touchdown_seen[leg] = state.stance[leg]
-        state.early_contact[leg] = state.unloaded[leg] = 0.0
-        if state.stance[leg] > 0.5:
-            state.ground[leg] = sole_z[leg]
-            total += sole_z[leg]
-            count += 1
-    state.ground_height += rate * (total / count - state.ground_height)
 
 
 @compiled
@@ -70,8 +59,7 @@ def _update_stance(state: np.record, gains: np.record, leg: int) -> None:
         state.early_contact[leg] = state.unloaded[leg] = 0.0
     state.lift[leg] = state.retraction[leg] = 0.0
     state.unloaded[leg] = 0.0 if carries else state.unloaded[leg] + state.dt
-    lost = state.unloaded[leg] > _LOST
-    state.contact[leg] = 0.0 if lost else 1.0
+    state.contact[leg] = 0.0 if state.unloaded[leg] > _LOST else 1.0
 
 
 @compiled
@@ -90,8 +78,7 @@ def _update_swing(state: np.record, gains: np.record, leg: int) -> None:
     if state.early_contact[leg] > 0.5:
         if rejects:
             state.unloaded[leg] = 0.0 if loaded else state.unloaded[leg] + state.dt
-        lost = state.unloaded[leg] > _LOST
-        state.contact[leg] = 0.0 if lost else 1.0
+        state.contact[leg] = 0.0 if state.unloaded[leg] > _LOST else 1.0
     elif gains.reflex_ms > 0.0:
         in_time = swung > _EARLIEST_RETRACTION and state.progress < _LATEST_RETRACTION
         if loaded and not below and in_time:

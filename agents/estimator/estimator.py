@@ -26,9 +26,7 @@ from quadriga.shared.messages import State, Truth
 from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.jit import compiled
 
-_Q_JOINT, _V_JOINT, _TAU_JOINT = (State.CUTS[k] for k in ("q_joint", "v_joint", "tau_joint"))
-_QUAT, _GYRO, _ACCEL = (State.CUTS[k] for k in ("imu_quat_wxyz", "imu_gyro", "imu_accel"))
-_FOOT_FORCE = State.CUTS["foot_force"]
+_SENSED: Final = slice(RobotState.CUTS["q_joint"][0].start, RobotState.CUTS["foot_counts"][0].stop)
 NO_TRUTH: Final = np.empty(0)  # for the truth that is not known
 
 
@@ -40,15 +38,11 @@ def estimate(
     gains: Array,
     truth: Array | None = None,
 ) -> RobotState:
-    """A robot's state at a tick.
+    """A robot's state at a tick, `dt` s after the last one.
 
-    Args:
-        before: at the last tick, after `control`; None: it stands still at the origin.
-        sensors: what it measures.
-        schedule: a row of `Gait`.
-        dt: time since the last tick, s.
-        gains: `gains_row`.
-        truth: `truth_row`, to take for the filter's estimate, for comparison with it.
+    `before` is the state after `control` then; None: the robot stands still at the origin.
+    `schedule` is a row of `Gait`, `gains` a `gains_row`, `truth` a `truth_row` to take for the
+    filter's estimate, for comparison with it.
     """
     row = np.empty(ROBOT_STATE.itemsize // 8)
     row0 = standing_state(sensors, gains).row if before is None else before.row
@@ -98,10 +92,7 @@ def estimate_rows(
     state.stance[:], state.progress = schedule[:4], schedule[4]
     state.switched = 1.0 if schedule[5] != state.half_cycle else 0.0
     state.half_cycle = schedule[5]
-    state.q_joint[:], state.v_joint[:] = readings[_Q_JOINT], readings[_V_JOINT]
-    state.tau_joint[:], state.quat_wxyz[:] = readings[_TAU_JOINT], readings[_QUAT]
-    state.omega[:], state.accel[:] = readings[_GYRO], readings[_ACCEL]
-    state.foot_counts[:] = readings[_FOOT_FORCE]
+    after[_SENSED] = readings
     if len(truth) > 0:
         _take_truth(state, gains, truth)
     else:

@@ -43,11 +43,9 @@ def take_imu_error_off(state: np.record) -> None:
     half = 0.5 * _TILT_SHARE / GRAVITY  # an error r of the attitude gives one of g (r × ẑ)
     a, b = half * error[1], -half * error[0]
     quat = np.array([w - x * a - y * b, x + w * a - z * b, y + w * b + z * a, z + x * b - y * a])
-    rest = 1.0 - _TILT_SHARE
     state.quat_wxyz[:] = quat
-    state.accel[0] -= rest * error[0]
-    state.accel[1] -= rest * error[1]
-    state.accel[2] -= error[2]
+    for axis in range(3):
+        state.accel[axis] -= (1.0 - _TILT_SHARE if axis < 2 else 1.0) * error[axis]
 
 
 @compiled

@@ -63,10 +63,7 @@ def leg_kinematics(
 ) -> tuple[Array, Array, Array]:
     """Foot centres, their velocities and the calves' angular velocities relative to the trunk.
 
-    Args:
-        q_joint: joint angles, (12,), rad.
-        v_joint: joint rates, (12,), rad/s.
-        geometry: of the robot, or `GAINS`.
+    By joint angles, (12,), rad, and rates, (12,), rad/s.
 
     Returns:
         `p_foot` (4, 3) m, `v_foot` (4, 3) m/s and `omega_calf` (4, 3) rad/s, trunk frame,

@@ -155,10 +155,8 @@ def momentum_of(inertia: Inertia, motion: Spatial) -> Spatial:
         xz * w[0] + yz * w[1] + zz * w[2],
     )
     linear_momentum = (mass * linear[0], mass * linear[1], mass * linear[2])
-    return (
-        add_vectors(linear_momentum, vector_product(w, h)),
-        add_vectors(spin, vector_product(h, linear)),
-    )
+    p = add_vectors(linear_momentum, vector_product(w, h))
+    return p, add_vectors(spin, vector_product(h, linear))
 
 
 @compiled
@@ -196,14 +194,10 @@ class LegState(NamedTuple):
 
 @compiled
 def leg_state(links: Array, q: Array, rates: Array, trunk: Spatial, gravity: Spatial) -> LegState:
-    """The state of a leg.
+    """The state of a leg at joint angles q, (3,), rad, and rates, (3,), rad/s.
 
-    Args:
-        links: its rows of `link_table`, (3, 14).
-        q: its joint angles, (3,), rad.
-        rates: its joint rates, (3,), rad/s.
-        trunk: motion of the trunk.
-        gravity: the acceleration that stands for it.
+    `links` are its rows of `link_table`, (3, 14), `trunk` is the trunk's motion, `gravity` the
+    acceleration that stands for gravity.
     """
     # Places and axes of the links; their joints turn about x, y and y.
     c, s = np.cos(q[0]), np.sin(q[0])
@@ -280,13 +274,9 @@ def reaction_torques(
 ) -> tuple[Array, Array]:
     """Torques M q̈ + h − τ = Jᵀ f that the ground's forces have in the joints.
 
-    The trunk's angular acceleration is left out: no sensor measures it.
-
-    Args:
-        state: `ROBOT_STATE`, of which q_joint, v_joint, tau_joint and omega are read.
-        acceleration: q̈ of the joints, (12,), rad/s².
-        specific_force: of the trunk's origin, (3,), m/s², trunk frame: gravity and acceleration.
-        links: `link_table`.
+    The trunk's angular acceleration is left out: no sensor measures it. `acceleration` is q̈,
+    (12,), rad/s², `specific_force` that of the trunk's origin, (3,), m/s², trunk frame, with
+    gravity.
 
     Returns:
         h − τ and M q̈, (12,) each, N·m.
@@ -311,23 +301,16 @@ def reaction_torques(
 
 @compiled
 def foot_forces(torques: Array, q_joint: Array, geometry: Geometry | np.record) -> Array:
-    """Forces f on the feet's centres with Jᵀ f = `torques`, (4, 3), N, trunk frame.
+    """Forces f on the feet's centres with Jᵀ f = `torques`, (12,), N·m; (4, 3), N, trunk frame.
 
-    Zero for a leg that is stretched so far that its torques do not tell the force.
-
-    Args:
-        torques: `reaction_torques`, (12,), N·m.
-        q_joint: joint angles, (12,), rad.
-        geometry: of the legs, or `GAINS`.
+    Joint angles are (12,), rad. Zero for a leg that is stretched so far that its torques do not
+    tell the force.
     """
     out, link = np.zeros((4, 3)), geometry.link
     for leg in range(4):
         first, y = 3 * leg, geometry.thigh_y if leg % 2 == 0 else -geometry.thigh_y
-        hip, thigh, calf = (
-            q_joint[first],
-            q_joint[first + 1],
-            q_joint[first + 1] + q_joint[first + 2],
-        )
+        hip, thigh = q_joint[first], q_joint[first + 1]
+        calf = thigh + q_joint[first + 2]
         # In the hip frame, before the roll by the hip angle about x; of thigh and calf.
         ca, sa = np.cos(hip), np.sin(hip)
         sb, cb, sc, cc = np.sin(thigh), np.cos(thigh), np.sin(calf), np.cos(calf)
@@ -364,12 +347,9 @@ class RigidBodyTerms(NamedTuple):
 
 @compiled
 def rigid_body_terms(q: Array, v: Array, links: Array) -> RigidBodyTerms:
-    """The terms of the equation of motion.
+    """The terms of the equation of motion, by Pinocchio's configuration and velocity.
 
-    Args:
-        q: Pinocchio's configuration, (19,), its quaternion normalised.
-        v: Pinocchio's velocity, (18,).
-        links: `link_table`.
+    q is (19,), its quaternion normalised, v is (18,).
     """
     M_inverse, nle = np.zeros((18, 18)), np.empty(18)
     J, dJ = np.empty((6, 18)), np.empty((6, 18))
@@ -445,10 +425,9 @@ def _complete_inverse(whole: Inertia, reaction: Array, reduced: Array, M_inverse
     trunk = np.eye(6)
     for k in range(6):
         e = trunk[k]
-        linear, angular = momentum_of(whole, ((e[0], e[1], e[2]), (e[3], e[4], e[5])))
-        for i in range(3):
-            reduced[i, k] += linear[i]
-            reduced[3 + i, k] += angular[i]
+        momentum = momentum_of(whole, ((e[0], e[1], e[2]), (e[3], e[4], e[5])))
+        for i in range(6):
+            reduced[i, k] += momentum[i // 3][i % 3]
     cholesky_solve(cholesky(reduced), trunk)
     coupled = product(trunk, reaction)
     M_inverse[:6, :6] = trunk
@@ -499,14 +478,6 @@ def add_gram(weight: float, A: Array, H: Array) -> None:
             a = weight * A[k, i]
             for j in range(i + 1):
                 H[i, j] += a * A[k, j]
-
-
-@compiled
-def symmetrise(H: Array) -> None:
-    """Copy the lower triangle of H to the upper one."""
-    for i in range(H.shape[0]):
-        for j in range(i):
-            H[j, i] = H[i, j]
 
 
 @compiled

@@ -34,7 +34,7 @@ ROBOT_STATE: Final = np.dtype(
             ("progress", float),  # of the half cycle, [0, 1)
             ("half_cycle", float),  # its number; −1: the robot stands on four feet
             ("switched", float),  # flag: stances and swings have just ended
-            # What the sensors measure, the error of the IMU taken off.
+            # What the sensors measure, in the order of `State`, the error of the IMU taken off.
             ("q_joint", float, N_JOINTS),  # rad
             ("v_joint", float, N_JOINTS),  # rad/s
             ("tau_joint", float, N_JOINTS),  # N·m
@@ -201,9 +201,3 @@ class RobotState(RecordRow):
     def upright(self) -> float:
         """Cosine of the angle between the trunk's z axis and the vertical."""
         return float(self.R[2, 2])
-
-    @property
-    def mean_planned_force(self) -> Array:
-        """Mean of the planned forces so far in the present sample, (12,), N, yaw frame."""
-        mean: Array = self.force_sum / max(1.0, self.force_count)
-        return mean

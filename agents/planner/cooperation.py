@@ -113,13 +113,8 @@ def build_team_problem(
         F_past += slope @ block[:, :past]
         H += slope @ block[:, past + columns]
     own = predictor.block(index, index, phase)
-    condensed = Condensed(
-        H=0.5 * (H + H.T),
-        F_past=F_past,
-        F_des=-slopes.sum(axis=0),
-        Y_v=np.ascontiguousarray(own[:, past + columns]),
-        Y_past=np.ascontiguousarray(own[:, :past]),
-    )
+    Y_v, Y_past = (np.ascontiguousarray(own[:, part]) for part in (past + columns, slice(past)))
+    condensed = Condensed(0.5 * (H + H.T), F_past, -slopes.sum(axis=0), Y_v, Y_past)
     return constrain(config.planner, config.robot.weight, condensed, stance)
 
 
@@ -152,12 +147,8 @@ def stay_near_last(
 ) -> Array:
     """The linear term of w times the QP that stays near the last plan; its Hessian is that of V.
 
-    Args:
-        problem: of `build_team_problem`.
-        f: linear term of V by own stance forces, (nv,).
-        w: share of the new plan.
-        last: the last plan's deviations of these forces, (nv,), N.
-        innovation: δ, (18 T_ini,).
+    `problem` is of `build_team_problem`, f the linear term of V by own stance forces, (nv,), w the
+    new plan's share, `last` the last plan of these forces, (nv,), N, `innovation` δ, (18 T_ini,).
     """
     condensed = problem.condensed
     return w * f + (1.0 - w) * (condensed.F_past @ innovation - condensed.H @ last)

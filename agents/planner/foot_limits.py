@@ -100,9 +100,7 @@ def minimise(qp: ForceQp, f: Array) -> Minimum:
     if inside:
         return Minimum(free, nothing, Residuals(exact, 0.0, 0.0), 0)
     solutions = _MOST if np.isfinite(np.dot(f, f)) else 0
-    metric = np.empty(nv)
-    for i in range(nv):
-        metric[i] = -_STEP * minus_inverse[i, i]
+    metric = -_STEP * np.diag(minus_inverse)
     faces = _Faces(np.zeros(nv), np.zeros(nv, dtype=np.bool_), np.zeros(nv))
     v, gradient = free, np.zeros(nv)
     for solution in range(solutions):
@@ -112,9 +110,7 @@ def minimise(qp: ForceQp, f: Array) -> Minimum:
             if is_optimal(found.residuals):
                 return found
             break
-        count = 0
-        for i in range(nv):
-            count += faces.fixed[i]
+        count = int(np.count_nonzero(faces.fixed))
         if 2 * count <= nv:
             v, gradient = _pull_back(minus_inverse, free, faces, count)
         else:
@@ -218,12 +214,7 @@ def _pull_back(minus_inverse: Array, free: Array, faces: _Faces, count: int) -> 
                 off[k] -= tilt[i] * free[foot + 2]
             k += 1
     # The rows are the negative normals, and so is the inverse: their product is positive definite.
-    gram = _gram(minus_inverse, rows, places, -1.0)
-    _solve(gram, off)
-    gradient = np.zeros(nv)
-    for k in range(count):
-        for axis in range(3):
-            gradient[places[k] + axis] += rows[k, axis] * off[k]
+    gradient = _solve_on_rows(minus_inverse, rows, places, -1.0, off)
     return free - minus_inverse @ gradient, gradient
 
 
@@ -251,17 +242,15 @@ def _move_along(H: Array, f: Array, faces: _Faces, count: int) -> tuple[Array, A
                     rows[k, j] = tilt[foot + j]
                     w[k] -= tilt[foot + j] * gradient[foot + j]
             k += 1
-    _solve(_gram(H, rows, places, 1.0), w)
-    moved = np.zeros(nv)
-    for k in range(count):
-        for axis in range(3):
-            moved[places[k] + axis] += rows[k, axis] * w[k]
+    moved = _solve_on_rows(H, rows, places, 1.0, w)
     return v + moved, gradient + H @ moved
 
 
 @compiled
-def _gram(K: Array, rows: Array, places: NDArray[np.int64], sign: float) -> Array:
-    """The upper triangle of sign · R K Rᵀ; row k of R has `rows[k]` from `places[k]` on."""
+def _solve_on_rows(
+    K: Array, rows: Array, places: NDArray[np.int64], sign: float, x: Array
+) -> Array:
+    """Rᵀ (sign · R K Rᵀ)⁻¹ x; row k of R has `rows[k]` from `places[k]` on. Replaces x."""
     count, row = len(places), np.empty(len(K))
     gram = np.zeros((count, count))
     for a in range(count):
@@ -273,7 +262,12 @@ def _gram(K: Array, rows: Array, places: NDArray[np.int64], sign: float) -> Arra
         for b in range(a, count):
             at = places[b]
             gram[a, b] = rows[b, 0] * row[at] + rows[b, 1] * row[at + 1] + rows[b, 2] * row[at + 2]
-    return gram
+    _solve(gram, x)
+    out = np.zeros(len(K))
+    for k in range(count):
+        for axis in range(3):
+            out[places[k] + axis] += rows[k, axis] * x[k]
+    return out
 
 
 @compiled
@@ -288,12 +282,12 @@ def _with_proof(qp: ForceQp, f: Array, v: Array, faces: _Faces, solutions: int) 
         height, reach = value[i + 2], upper[row] + slope * value[i + 2]
         # Held where the pyramid reaches the box: its sides bear what z asks for, the box the rest.
         jump = fixed[i + 2] and lower[i + 2] < height < upper[i + 2]
-        x, y = -(Hv[i] + f[i]), -(Hv[i + 1] + f[i + 1])
+        x, y, z = -(Hv[i] + f[i]), -(Hv[i + 1] + f[i + 1]), -(Hv[i + 2] + f[i + 2])
         x_jumps = jump and fixed[i] and abs(reach - upper[i]) <= _CLOSE
         y_jumps = jump and fixed[i + 1] and abs(reach - upper[i + 1]) <= _CLOSE
         x_side = abs(x) if tilt[i] != 0.0 and not x_jumps else 0.0
         y_side = abs(y) if tilt[i + 1] != 0.0 and not y_jumps else 0.0
-        z = -(Hv[i + 2] + f[i + 2]) + slope * (x_side + y_side)
+        z += slope * (x_side + y_side)
         if x_jumps:
             x_side = min(abs(x), max(0.0, -z / slope))
             z += slope * x_side

@@ -36,7 +36,7 @@ from quadriga.agents.planner.qp import stance_columns
 from quadriga.agents.plausibility import is_plausible
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.shared.config.sections import Config
-from quadriga.shared.messages import Measurement, Plan
+from quadriga.shared.messages import Measurement, Message, Plan
 from quadriga.shared.robots.conventions import N_FORCES, N_OUTPUTS, Array, robot_names
 from quadriga.shared.runtime.record import record
 from quadriga.shared.topics import MEASUREMENT, SAMPLE_MS
@@ -118,15 +118,9 @@ class PeerTerms:
 
 
 class Neighbours:
-    """The delay protocol of one agent; holds no state beyond its configuration.
+    """The delay protocol of agent `index`, 0-based; holds no state beyond its configuration.
 
-    Args:
-        config: the team's configuration.
-        index: this agent's place in the team, 0-based.
-        peers: places of the robots that matter to it; None: all others.
-
-    Attributes:
-        names: of these robots.
+    `peers` are the places of the robots that matter to it, None: all others; `names` their names.
     """
 
     def __init__(self, config: Config, index: int, peers: frozenset[int] | None = None) -> None:
@@ -143,7 +137,7 @@ class Neighbours:
 
     def initial(self) -> PeerMemory:
         """The memory before the first message."""
-        return PeerMemory({name: PeerHistory() for name in self._indices})
+        return PeerMemory(dict.fromkeys(self._indices, PeerHistory()))
 
     def remember(
         self,
@@ -202,12 +196,7 @@ class Neighbours:
         )
 
     def is_complete(self, memory: PeerMemory, serial: tuple[int, int]) -> bool:
-        """Whether every peer's plan of this step and exchange is there, and its window before it.
-
-        Args:
-            memory: what has been remembered.
-            serial: step and exchange, see `Plan.serial`.
-        """
+        """Whether every peer's plan of this `Plan.serial` is there, and its window before it."""
         end = serial[0] * self._step_ms
         return all(
             history.plans
@@ -260,18 +249,13 @@ class Neighbours:
         """Status of a peer at step `last`, the age of its newest plan, and its plans until then."""
         oldest = first_step - patience(self._config)  # what is older was made before a stop
         plans = tuple(plan for plan in history.plans if oldest <= plan.step <= last)
-        age = last - (plans[-1].step if plans else first_step - 1)
-        if age > patience(self._config) or self._has_stopped(history, plans, last):
+        age, end = last - (plans[-1].step if plans else first_step - 1), last * self._step_ms
+        newest = [sample for sample in history.measurements if sample.tick <= end][-1:]
+        # A peer that has come to stand since its newest plan makes none any more.
+        stopped = plans and newest and newest[0].tick > plans[-1].tick and _stands(newest[0])
+        if age > patience(self._config) or stopped:
             return LOST, age, plans
         return SILENT if age > self._config.planner.max_peer_age else USABLE, age, plans
-
-    def _has_stopped(self, history: PeerHistory, plans: tuple[Plan, ...], last: int) -> bool:
-        """Whether a peer has come to stand since its newest plan: it makes none any more."""
-        end = last * self._step_ms
-        sample = next((s for s in reversed(history.measurements) if s.tick <= end), None)
-        if not plans or sample is None:
-            return False
-        return sample.tick > plans[-1].tick and _stands(sample)
 
     def _window(
         self,
@@ -287,27 +271,19 @@ class Neighbours:
         newest = last * self._step_ms
         measured = {sample.tick - SAMPLE_MS: sample for sample in samples if sample.tick <= newest}
         stance = scheduled_stance(self._config, index, starts)
-        known = np.ones(T_ini, dtype=np.bool_)
+        known = np.zeros(T_ini, dtype=np.bool_)
         u, y = np.zeros((T_ini, N_FORCES)), np.zeros((T_ini, N_OUTPUTS))
         for k, start in enumerate(starts.tolist()):
             if (sample := measured.get(start)) is not None:
-                stance[k], u[k], y[k] = sample.stance > 0.5, sample.u, sample.y
-            elif (planned := _plan_at(plans, start)) is not None:
-                u[k], y[k] = planned
-            else:
-                known[k] = False
+                known[k], stance[k], u[k], y[k] = True, sample.stance > 0.5, sample.u, sample.y
+                continue
+            for plan in plans:  # the newest that has this sample counts
+                ahead = (start - plan.tick) // SAMPLE_MS
+                if 0 <= ahead < len(plan.u):
+                    known[k], u[k], y[k] = True, plan.u[ahead], plan.y[ahead]
         du = u - nominal_forces(stance, weight)
         du[~known] = 0.0
         return known, du, y
-
-
-def _plan_at(plans: tuple[Plan, ...], start: int) -> tuple[Array, Array] | None:
-    """Forces and outputs that the newest plan has for the sample which begins at a tick."""
-    for plan in reversed(plans):
-        ahead = (start - plan.tick) // SAMPLE_MS
-        if 0 <= ahead < len(plan.u):
-            return plan.u[ahead], plan.y[ahead]
-    return None
 
 
 def _stands(sample: Measurement) -> bool:
@@ -315,31 +291,26 @@ def _stands(sample: Measurement) -> bool:
     return bool((sample.stance > 0.5).all())
 
 
-def _order(message: Measurement | Plan) -> tuple[int, int]:
-    """What messages of a kind are sorted by."""
+def order_of(message: Message) -> tuple[int, int]:
+    """Where a message stands among those of its source: by tick, or by step and exchange."""
     return message.serial if isinstance(message, Plan) else (message.tick, 0)
 
 
 def _insert(held: tuple[M, ...], new: M, oldest: int) -> tuple[M, ...]:
     """`held` with `new` sorted in, without what is older; `held` itself if it has `new` already."""
-    place = bisect_left(held, _order(new), key=_order)
-    if place < len(held) and _order(held[place]) == _order(new):
+    place = bisect_left(held, order_of(new), key=order_of)
+    if place < len(held) and order_of(held[place]) == order_of(new):
         return held
     kept = [item for item in held[:place] if item.tick >= oldest]
     return (*kept, new, *held[place:])
 
 
 class Peers:
-    """Fixed data of one agent's coupling to its peers; its functions depend on arguments alone.
+    """How its peers act on agent `index`, 0-based; functions of their arguments alone.
 
     A swinging leg of a peer carries no force: its columns of G, a third of all, are left out, which
     is exact. Single precision changes an effect by 3e-7 of its size and halves the memory that is
     read.
-
-    Args:
-        config: the team's configuration.
-        index: this agent's place in the team, 0-based.
-        predictor: fitted for this team.
     """
 
     def __init__(self, config: Config, index: int, predictor: Predictor) -> None:
@@ -359,13 +330,10 @@ class Peers:
     def terms(
         self, peers: tuple[PeerData, ...], step: int, window_step: int, y_base: Array
     ) -> PeerTerms:
-        """The peers' terms of eq. 11 for planning step `step`.
+        """The terms of eq. 11 of the peers of `Neighbours.select` for planning step `step`.
 
-        Args:
-            peers: see `Neighbours.select`.
-            step: chooses the transition matrix.
-            window_step: planning step at which the peers' windows end.
-            y_base: base of the outputs at the ends of the windows' samples, (T_ini, 6).
+        Their windows end at `window_step`; `y_base` is the base of the outputs at the ends of the
+        windows' samples, (T_ini, 6).
         """
         if not peers:
             return PeerTerms()
@@ -388,20 +356,18 @@ class Peers:
     def _build_coupling(
         self, step: int, window_step: int
     ) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
-        """Of all peers' z at a step, whose plans begin at `window_step`: places, and rows of G."""
-        stance = [horizon_stance(self._config, j, window_step) for j in self._others]
-        return couple(self._blocks(step), stance)
+        """Of all peers' z at a step, whose plans begin at `window_step`: places, and rows of G.
 
-    def _blocks(self, step: int) -> list[Array]:
-        """G_ij of each peer; with the team's cost [G_ij; M_ij]."""
+        With the team's cost those are the rows of [G_ij; M_ij].
+        """
         config, index, predictor = self._config, self._index, self._predictor
         phase = phase_of(config, step, predictor.phases)
         blocks = [predictor.block(index, j, phase) for j in self._others]
-        if not self._cooperative:
-            return blocks
-        slopes = team_slope(config, predictor, index, step)
-        rows = [peer_slope(slopes, predictor, j, phase) for j in self._others]
-        return [np.concatenate(pair) for pair in zip(blocks, rows, strict=True)]
+        if self._cooperative:
+            slopes = team_slope(config, predictor, index, step)
+            rows = [peer_slope(slopes, predictor, j, phase) for j in self._others]
+            blocks = [np.concatenate(pair) for pair in zip(blocks, rows, strict=True)]
+        return couple(blocks, [horizon_stance(config, j, window_step) for j in self._others])
 
 
 def couple(
@@ -409,9 +375,7 @@ def couple(
 ) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
     """Places, (c,), in all peers' z = [u_ini; y_ini; u], and the columns of G there, (rows, c).
 
-    Args:
-        G: of each peer, (rows, 18 T_ini + 12 N).
-        stance: of each peer over its plan, (N, 4).
+    G is (rows, 18 T_ini + 12 N) of each peer, its stance over its plan (N, 4).
     """
     columns, rows = [np.zeros(0, dtype=np.int64)], [np.zeros((len(G[0]) if len(G) else 0, 0))]
     for i, (block, legs) in enumerate(zip(G, stance, strict=True)):

@@ -131,22 +131,10 @@ class _Prediction(NamedTuple):
     nominal_table: Array
 
 
-@record
-class _Setup:
-    """Set-up of one step of the gait's cycle."""
-
-    problem: PlannerProblem
-    solver: DaqpSolver
-    prediction: _Prediction
-
-
 class Planner:
-    """Immutable set-up of one agent's planner; its functions depend on their arguments alone.
+    """Immutable set-up of the planner of agent `index`, 0-based, with a `load_checked` predictor.
 
-    Args:
-        config: the team's configuration.
-        index: this agent's place in the team, 0-based.
-        predictor: fitted for this team (see `load_checked`).
+    Its functions depend on their arguments alone.
 
     Raises:
         PredictorError: the predictor's sizes are not the configuration's.
@@ -166,13 +154,7 @@ class Planner:
     def step(
         self, state: PlannerState, inputs: PlannerInputs, peers: PeerTerms
     ) -> tuple[PlannerState, PlanResult]:
-        """Plan the horizon of one planning step, or plan it again with the peers' newer terms.
-
-        Args:
-            state: the last plan.
-            inputs: the agent's own data.
-            peers: the peers' terms of eq. 11.
-        """
+        """Plan the horizon of one planning step, or plan it again with the peers' newer terms."""
         result, _ = self._solve(state, inputs, peers, as_qp=False)
         return PlannerState(inputs.step, result.du, result.y), result
 
@@ -188,34 +170,31 @@ class Planner:
         self, state: PlannerState, inputs: PlannerInputs, peers: PeerTerms, *, as_qp: bool
     ) -> tuple[PlanResult, SolvedQp | None]:
         """The plan by compiled code; by a solver where that fails or the QP itself is asked for."""
-        setup = self._setup(place_in(self._cycle, inputs.step))
-        problem, f, effect = setup.problem, _OWN_COST, peers.effect
-        last = self._last(problem, state, inputs.step)
+        problem, solver, prediction = self._setup(place_in(self._cycle, inputs.step))
+        f, effect, last = _OWN_COST, peers.effect, self._last(problem, state, inputs.step)
         if self._cooperative:
             past = inputs.past()
             f = problem.linear_term(past, inputs.wanted()) + peers.slope
             innovation = self._innovation(past, state, inputs)
             f = stay_near_last(problem, f, self._new_share, last, innovation)
         if not isinstance(effect, np.ndarray):  # one type: machine code is made for each
-            effect = np.full(len(setup.prediction.Y_past), effect)
+            effect = np.full(len(prediction.Y_past), effect)
         window = inputs.u_ini, inputs.y_ini, inputs.stance_ini, inputs.y_base_ini
         forces, outputs, y_free, f, residuals, solutions = _plan_step(
             (*window, inputs.y_base, inputs.y_des),
             effect,
             f,
             (self._kept, last),
-            setup.prediction,
-            setup.solver.force_qp,
-            setup.solver.limits_feet and not peers.lost,
+            prediction,
+            solver.force_qp,
+            solver.limits_feet and not peers.lost,
         )
         if solutions != FAILED and not as_qp:
             (u, du), (y, y_nominal) = forces, outputs
             return PlanResult(SOLVED, u, du, y, y_nominal, residuals, solutions), None
-        error = y_free - inputs.wanted()
-        qp: SolvedQp | None = None
-        solution = no_solution(problem, PEER_LOST)
+        error, qp, solution = y_free - inputs.wanted(), None, no_solution(problem, PEER_LOST)
         if not peers.lost:
-            solution = setup.solver.solve(f, error)
+            solution = solver.solve(f, error)
             qp = SolvedQp(problem.shifted(error), f, solution)
         x, status = solution.x, solution.status
         if self._kept and status == SOLVED:
@@ -227,7 +206,7 @@ class Planner:
             du, y, y_nominal = np.zeros_like(du), inputs.y_des, inputs.y_des
             status = IMPLAUSIBLE if status == SOLVED else status
         status = SOLVED if status == SOLVED else with_detail(NOMINAL, status)
-        u, proof = setup.prediction.nominal + du, (solution.residuals, solution.iterations)
+        u, proof = prediction.nominal + du, (solution.residuals, solution.iterations)
         return PlanResult(status, u, du, y, y_nominal, *proof), qp
 
     def _last(self, problem: PlannerProblem, state: PlannerState, step: int) -> Array:
@@ -250,7 +229,7 @@ class Planner:
         y[T_ini - since :] = inputs.y_ini[T_ini - since :] - state.y[:since]
         return innovation
 
-    def _build_setup(self, step: int) -> _Setup:
+    def _build_setup(self, step: int) -> tuple[PlannerProblem, DaqpSolver, _Prediction]:
         config, index, past = self._config, self._index, self._predictor.layout.past
         stance, weight = horizon_stance(config, index, step), config.robot.weight
         if self._cooperative:
@@ -263,7 +242,7 @@ class Planner:
         condensed, nominal = problem.condensed, nominal_forces(stance, weight)
         matrices = condensed.Y_past, condensed.Y_v, condensed.F_des
         prediction = _Prediction(*matrices, problem.columns, nominal, nominal_table(weight))
-        return _Setup(problem, solver, prediction)
+        return problem, solver, prediction
 
 
 @compiled

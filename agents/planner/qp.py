@@ -150,13 +150,12 @@ def constrain(
     feet = len(columns) // 3
     c = config.mu / np.sqrt(2.0)
     pyramid = np.array([[1.0, 0.0, -c], [-1.0, 0.0, -c], [0.0, 1.0, -c], [0.0, -1.0, -c]])
-    nominal = nominal_forces(stance, weight).reshape(-1)[columns].reshape(feet, 3)
-    box = np.tile(config.deviation_max, (feet, 1))
+    nominal_z = nominal_forces(stance, weight).ravel()[columns[2::3]]
+    box = np.tile(config.deviation_max, feet)
     low = -box
-    low[:, 2] = np.maximum(low[:, 2], config.force_min - nominal[:, 2])
+    low[2::3] = np.maximum(low[2::3], config.force_min - nominal_z)
     A = np.kron(np.eye(feet), pyramid)
-    lower = [low.ravel(), np.full(4 * feet, -np.inf)]
-    upper = [box.ravel(), np.repeat(c * nominal[:, 2], 4)]
+    lower, upper = [low, np.full(4 * feet, -np.inf)], [box, np.repeat(c * nominal_z, 4)]
     bounded = np.zeros(0, dtype=np.int64)
     if config.output_bounds != NO_BOUNDS:
         limit = np.tile(config.output_max, len(stance))

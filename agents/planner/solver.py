@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from types import MappingProxyType
 from typing import Final
 
 import daqp
@@ -27,10 +26,10 @@ from quadriga.shared.runtime.record import record
 SOLVED: Final = "solved"
 NOMINAL: Final = "nominal"  # code of a plan's status: no solution, hence the nominal forces
 _FAR: Final = 1e30  # DAQP's infinity
-_DAQP_STATUS: Final = MappingProxyType({
+_DAQP_STATUS: Final = {
     1: SOLVED, -1: "infeasible", -2: "cycling", -3: "unbounded", -4: "iteration-limit",
     -5: "not-convex", -6: "overdetermined",
-})  # fmt: skip
+}  # fmt: skip
 
 
 @record
@@ -88,11 +87,9 @@ class DaqpSolver:
         self._solve_by_daqp(zero, problem)
 
     def solve(self, f: Array, error: Array | None = None) -> QpSolution:
-        """The minimiser, or the reason why there is none. Never raises for a bad f.
+        """The minimiser for f, (nx,), or the reason why there is none. Never raises for a bad f.
 
-        Args:
-            f: linear term, shape (nx,).
-            error: that bounds of outputs depend on, see `PlannerProblem.shifted`.
+        Bounds of outputs depend on `error`, see `PlannerProblem.shifted`.
         """
         if self.limits_feet:
             found = minimise(self.force_qp, f)
@@ -154,9 +151,7 @@ class OsqpSolver(DaqpSolver):
         return answer if answer.status == SOLVED else self._solve_by_daqp(f, problem)
 
 
-SOLVERS: Final[Mapping[str, type[DaqpSolver]]] = MappingProxyType(
-    {"daqp": DaqpSolver, "osqp": OsqpSolver}
-)
+SOLVERS: Final[Mapping[str, type[DaqpSolver]]] = {"daqp": DaqpSolver, "osqp": OsqpSolver}
 
 
 def no_solution(problem: PlannerProblem, status: str) -> QpSolution:

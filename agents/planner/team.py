@@ -22,7 +22,7 @@ them this is no longer the paper's problem.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -71,10 +71,7 @@ class TeamResult:
 class TeamPlanner:
     """Immutable set-up of the team's planner; `step` depends on its arguments alone.
 
-    Args:
-        config: the team's configuration.
-        formulation: cost and prediction for a contact phase and the team's stance (N n, 4).
-        phases: how many contact phases there are.
+    `formulation` is of one of `phases` contact phases and the team's stance, (N n, 4).
     """
 
     def __init__(self, config: Config, formulation: Formulation, phases: int = 1) -> None:
@@ -85,16 +82,12 @@ class TeamPlanner:
             self._setup(step)
 
     def step(self, inputs: Sequence[PlannerInputs]) -> TeamResult:
-        """Plan the horizon of one planning step for all robots.
-
-        Args:
-            inputs: of all robots in their order, of one step.
-        """
+        """Plan the horizon of one planning step for all robots, by their inputs in their order."""
         n, N = len(inputs), self._config.planner.N
         problem, solver, nominal = self._setup(place_in(self._cycle, inputs[0].step))
         past = np.concatenate([robot.past() for robot in inputs])
         base = np.concatenate([robot.y_base for robot in inputs])
-        y_des = np.concatenate([robot.y_des for robot in inputs]).ravel() - base.ravel()
+        y_des = np.concatenate([robot.wanted() for robot in inputs])
         y_free = problem.condensed.free(past, y_des)
         solution = solver.solve(problem.linear_term(past, y_des), y_free - y_des)
         du, dy = unpack(problem, solution.x, y_free)
@@ -128,10 +121,8 @@ def build_centralised(
     def formulation(phase: int, stance: NDArray[np.bool_]) -> Condensed:
         robots = range(config.team.robots)
         blocks = [[predictor.block(i, j, phase) for j in robots] for i in robots]
-        G_past, G_u = (
-            np.block([[block[:, part] for block in row] for row in blocks])
-            for part in (slice(past), slice(past, None))
-        )
+        G_past = np.block([[block[:, :past] for block in row] for row in blocks])
+        G_u = np.block([[block[:, past:] for block in row] for row in blocks])
         return condense(config.planner, G_past, G_u, stance)
 
     return TeamPlanner(config, formulation, predictor.phases)
@@ -145,12 +136,9 @@ def build_deepc(config: Config, _predictor: Predictor | None, collected: Collect
     """
     planner = config.planner
     if planner.output_bounds != NO_BOUNDS:
-        raise ConfigError(
-            "planner.output_bounds",
-            repr(planner.output_bounds),
-            repr(NO_BOUNDS),
-            'with planner.kind = "deepc" the outputs are eliminated together with g',
-        )
+        got, expected = repr(planner.output_bounds), repr(NO_BOUNDS)
+        cause = 'with planner.kind = "deepc" the outputs are eliminated together with g'
+        raise ConfigError("planner.output_bounds", got, expected, cause)
     layout = team_layout(config.team.robots, planner.T_ini, planner.N)
     model = build_model(reduce(collected(), layout), planner)
     return TeamPlanner(config, lambda _, stance: select(model, stance_columns(stance)))
@@ -206,11 +194,5 @@ def build_model(reduction: Reduction, config: PlannerConfig) -> Condensed:
 
 def select(model: Condensed, columns: NDArray[np.int64]) -> Condensed:
     """The same problem with all forces but `columns` zero: exact for legs that swing."""
-    return Condensed(
-        H=model.H[np.ix_(columns, columns)],
-        F_past=model.F_past[columns],
-        F_des=model.F_des[columns],
-        Y_v=np.ascontiguousarray(model.Y_v[:, columns]),
-        Y_past=model.Y_past,
-        Y_des=model.Y_des,
-    )
+    H, Y_v = model.H[np.ix_(columns, columns)], np.ascontiguousarray(model.Y_v[:, columns])
+    return replace(model, H=H, F_past=model.F_past[columns], F_des=model.F_des[columns], Y_v=Y_v)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import field, replace
-from typing import Any, Final
+from dataclasses import replace
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -17,10 +17,8 @@ from quadriga.shared.config.sections import Config, PlannerConfig
 from quadriga.shared.messages import Plan
 from quadriga.shared.modes import WALK
 from quadriga.shared.robots.conventions import N_FORCES, N_LEGS, N_OUTPUTS, Array
-from quadriga.shared.runtime.record import record
 from quadriga.shared.topics import SAMPLE_MS
 
-_NO_FORCE = np.zeros(12)
 # A planner's own plans keep to deviation_max: the share and N on top are for its solver.
 # With forces far beyond it a single plan would drive all joints to their limits.
 _SHARE: Final = 1.5
@@ -29,8 +27,7 @@ FADED: Final = "faded"  # status of a plan that is applied in part
 FARTHEST: Final = 10.0  # m, m/s, rad, rad/s: no trunk gets there, whatever is predicted
 
 
-@record
-class Setpoint:
+class Setpoint(NamedTuple):
     """What is applied at one tick.
 
     Attributes:
@@ -38,20 +35,15 @@ class Setpoint:
         y_ref: outputs to follow at the end of this sample, (6,); None without a plan.
     """
 
-    deviation: Array = field(default_factory=_NO_FORCE.copy)
-    y_ref: Array | None = None
+    deviation: Array
+    y_ref: Array | None
 
 
-_NO_SETPOINT = Setpoint()
+_NO_SETPOINT: Final = Setpoint(np.zeros(N_FORCES), None)
 
 
 class PlanCheck:
-    """What every plan of a robot must keep to, whoever has made it.
-
-    Args:
-        config: the team's configuration.
-        index: the robot's place in the team, 0-based.
-    """
+    """What every plan of robot `index`, 0-based, must keep to, whoever has made it."""
 
     def __init__(self, config: Config, index: int) -> None:
         self._config, self._index, self._step_ms = config, index, step_ms(config)
@@ -89,15 +81,10 @@ class PlanCheck:
 
         In the place of a plan that cannot be meant come nominal forces and the desired outputs,
         with a status that names the planner and the fault. A robot that does not walk has none.
-
-        Args:
-            outputs: of the planner.
-            inputs: of the same step.
-            plans: in force before.
+        `plans` are those in force before.
         """
-        plan, active, fault = outputs.plan, outputs.active, ""
-        if plan is not None:
-            fault = self.fault_of(plan, inputs.tick)
+        plan, active = outputs.plan, outputs.active
+        fault = "" if plan is None else self.fault_of(plan, inputs.tick)
         if active is not None:
             fault = fault or self.fault_of_active(active, inputs.tick)
         if fault:

@@ -43,12 +43,9 @@ class CentralOutputs:
 
 
 class Central:
-    """Fixed data of the central planner; `step` is a function of its arguments alone.
+    """Fixed data of the central planner of eq. 7 or eq. 5; functions of their arguments alone.
 
-    Args:
-        config: the team's configuration.
-        planner: eq. 7 or eq. 5.
-        clock_ns: read around the planner; only `CentralOutputs.planner_ns` depends on it.
+    `clock_ns` is read around the planner; only `CentralOutputs.planner_ns` depends on it.
     """
 
     def __init__(

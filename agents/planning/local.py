@@ -18,6 +18,7 @@ from quadriga.agents.planning.interface import (
     ActivePlan,
     Expected,
     PlanningInputs,
+    PlanningInterface,
     PlanningOutputs,
 )
 from quadriga.agents.planning.references import base_of_window, build_planner_inputs, is_gapless
@@ -54,14 +55,10 @@ class LocalState:
 _Request = tuple[tuple[int, int], PlannerInputs, PeerTerms]
 
 
-class LocalPlanning:
-    """Fixed data of an agent's own planning; its functions depend on their arguments alone.
+class LocalPlanning(PlanningInterface[LocalState]):
+    """How the agent `index`, 0-based, plans for itself; functions of their arguments alone.
 
-    Args:
-        config: the team's configuration.
-        index: the agent's place in the team, 0-based.
-        predictor: the fitted predictor.
-        clock_ns: read around the planner; only `PlanningOutputs.planner_ns` depends on it.
+    `clock_ns` is read around the planner; only `PlanningOutputs.planner_ns` depends on it.
     """
 
     def __init__(
@@ -76,12 +73,10 @@ class LocalPlanning:
 
     @property
     def peers(self) -> tuple[str, ...]:
-        """Robots whose plans and measurements it takes in."""
         return self._neighbours.names
 
     @property
     def effect_ms(self) -> int:
-        """The configured latency."""
         return self._config.planner.latency_ms
 
     def next_due(self, tick: int) -> int:
@@ -90,7 +85,6 @@ class LocalPlanning:
         return self._step_ms * step + min(self._exchange_ms * (exchange + 1), self._step_ms)
 
     def initial(self) -> LocalState:
-        """No message, no sample, no plan."""
         return LocalState(self._neighbours.initial())
 
     def expected(self, tick: int) -> Expected:
@@ -110,16 +104,12 @@ class LocalPlanning:
         state, request, unusual = self._update(state, inputs)
         if request is not None:
             return self._plan(state, request, inputs.tick, unusual)
-        walks = inputs.mode.name == WALK
-        stop = self._stop_without_plan(state, inputs) if walks else ""
+        stop = self._stop_without_plan(state, inputs)
         return state, PlanningOutputs(stop_reason=stop, unusual=unusual)
 
     def problem_of(self, state: LocalState, inputs: PlanningInputs) -> SolvedQp | None:
-        """The QP that `step` solves for these arguments; None if it solves none."""
         state, request, _ = self._update(state, inputs)
-        if request is None:
-            return None
-        return self._planner.problem_of(state.planner, *request[1:])
+        return request and self._planner.problem_of(state.planner, *request[1:])
 
     def is_whole(self, state: LocalState, tick: int) -> bool:
         """Whether its own window is whole, and its peers are heard and do not slow down."""
@@ -137,12 +127,11 @@ class LocalPlanning:
         self, state: LocalState, inputs: PlanningInputs
     ) -> tuple[LocalState, _Request | None, tuple[str, ...]]:
         """The state with all that has arrived, what the planner is asked now, and counters."""
-        unusual: tuple[str, ...] = ()
+        unusual, peers = tuple[str, ...](), state.peers
         if inputs.plans or inputs.measurements:
-            before, tick = state.peers, inputs.tick
-            peers = self._neighbours.remember(before, tick, inputs.measurements, inputs.plans)
-            unusual = (REFUSED,) * (peers.refused - before.refused)
-            state = replace(state, peers=peers)
+            came = inputs.measurements, inputs.plans
+            state = replace(state, peers=self._neighbours.remember(peers, inputs.tick, *came))
+            unusual = (REFUSED,) * (state.peers.refused - peers.refused)
         if inputs.measurement is not None:
             own = (*state.own, inputs.measurement)[-self._config.planner.T_ini :]
             state = replace(state, own=own)
@@ -220,13 +209,11 @@ class LocalPlanning:
 
         Asked at every tick: the one of the planning step may itself be missing.
         """
-        step = inputs.tick // self._step_ms
-        first = first_due_step(self._config, inputs.mode.since)
+        step, first = inputs.tick // self._step_ms, first_due_step(self._config, inputs.mode.since)
         age = step - max(state.planner.step, first - 1)
-        if age <= 0:
+        if inputs.mode.name != WALK or age <= 0:
             return ""
-        lost = self._neighbours.lost_peers(state.peers, step - 1, first)
-        if lost:
+        if lost := self._neighbours.lost_peers(state.peers, step - 1, first):
             return _peer_lost(lost)
         return WINDOW_LOST if age > patience(self._config) else ""
 

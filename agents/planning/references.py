@@ -66,12 +66,7 @@ def build_planner_inputs(
 ) -> PlannerInputs:
     """What a planning step consumes of a robot itself.
 
-    Args:
-        config: the team's configuration.
-        step: planning step.
-        end: its tick, at which the last sample ends.
-        samples: of the robot, at least the T_ini up to `end`.
-        references: what the operator asked for lately.
+    `end` is its tick, at which the last of `samples` ends, which are at least T_ini.
     """
     planner, window = config.planner, samples[-config.planner.T_ini :]
     now, _ = reference_at(references, end, config.reference.height)

@@ -29,14 +29,11 @@ class NominalPlanning(PlanningInterface[None]):
     effect_ms = NEVER_MS
 
     def next_due(self, tick: int) -> int:
-        """Never."""
         return tick + NEVER_MS
 
-    def initial(self) -> None:
-        """No state."""
+    def initial(self) -> None: ...
 
     def step(self, state: None, inputs: PlanningInputs) -> tuple[None, PlanningOutputs]:
-        """No deviation from nominal forces."""
         return None, PlanningOutputs()
 
 
@@ -47,14 +44,10 @@ def build_planning(
     clock_ns: Callable[[], int],
     collected: Collected | None = None,
 ) -> PlanningInterface[Any]:
-    """The planning part of one agent.
+    """The planning part of the agent `index`, 0-based.
 
-    Args:
-        config: the team's configuration.
-        index: the agent's place in the team, 0-based.
-        predictor: the fitted predictor; None: an agent that would plan with one does not plan.
-        clock_ns: read around the planner for telemetry.
-        collected: reads the collected episodes, for a kind whose agents plan with them.
+    An agent that would plan with a predictor does not plan without one. `clock_ns` is read around
+    the planner for telemetry, `collected` the episodes of a kind whose agents plan with them.
 
     Raises:
         ConfigError: the kind of planner is not installed, or cannot be imported.

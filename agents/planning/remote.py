@@ -38,12 +38,7 @@ class RemoteState:
 
 
 class RemotePlanning(PlanningInterface[RemoteState]):
-    """Fixed data of an agent that follows a central planner.
-
-    Args:
-        config: the team's configuration.
-        index: the agent's place in the team, 0-based.
-    """
+    """Fixed data of the agent `index`, 0-based, which follows a central planner."""
 
     def __init__(self, config: Config, index: int, *_: object) -> None:
         self._config, self._check = config, PlanCheck(config, index)
@@ -55,7 +50,6 @@ class RemotePlanning(PlanningInterface[RemoteState]):
         return tick + self._step_ms - (tick - self._latency) % self._step_ms
 
     def initial(self) -> RemoteState:
-        """No plan yet."""
         return RemoteState()
 
     def expected(self, tick: int) -> Expected:
@@ -81,16 +75,11 @@ class RemotePlanning(PlanningInterface[RemoteState]):
                 unusual += [f"plan_{FADED}"] if share < 1.0 else []
         if inputs.mode.name != WALK:
             return state, PlanningOutputs(unusual=tuple(unusual))
-        newest_step = state.newest[0]
-        due = (tick - self._latency) // self._step_ms
+        newest_step, due = state.newest[0], (tick - self._latency) // self._step_ms
         age = due - max(newest_step, first_due_step(self._config, inputs.mode.since) - 1)
-        age_ms = float(tick - self._step_ms * newest_step)
-        return state, PlanningOutputs(
-            active=active,
-            stop_reason=PLANNER_LOST if age > patience(self._config) else "",
-            ages_ms={"plan": age_ms} if newest_step >= 0 else {},
-            unusual=tuple(unusual),
-        )
+        stop = PLANNER_LOST if age > patience(self._config) else ""
+        ages = {"plan": float(tick - self._step_ms * newest_step)} if newest_step >= 0 else {}
+        return state, PlanningOutputs(None, active, stop, None, ages, tuple(unusual))
 
     def is_whole(self, state: RemoteState, tick: int) -> bool:
         """Whether its own samples come; the planner does not plan while robots stand."""

@@ -246,11 +246,8 @@ def wrench_map(kind: str) -> Array:
         kind: of robot, a key of `ROBOTS`.
     """
     feet = ROBOTS[kind].feet_under_hips
-    moments = np.zeros((3, N_LEGS, 3))
-    moments[0, :, 2] = feet[:, 1]
-    moments[1, :, 2] = -feet[:, 0]
-    moments[2, :, 0], moments[2, :, 1] = -feet[:, 1], feet[:, 0]
+    (x, y), moments = feet.T, np.zeros((3, N_LEGS, 3))
+    moments[0, :, 2], moments[1, :, 2], moments[2, :, 0], moments[2, :, 1] = y, -x, -y, x
     lever = float(np.linalg.norm(feet, axis=1).mean())
     forces = np.tile(np.eye(3)[:, None], (1, N_LEGS, 1))
-    full = np.concatenate([forces, moments / lever]) / _FORCE_SCALE
-    return full.reshape(N_WRENCH, N_FORCES)
+    return np.concatenate([forces, moments / lever]).reshape(N_WRENCH, N_FORCES) / _FORCE_SCALE

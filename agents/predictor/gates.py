@@ -7,6 +7,7 @@ The radius of the iteration of plans is one of the planner's own QPs.
 from __future__ import annotations
 
 import hashlib
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from itertools import product
@@ -78,15 +79,14 @@ class GateReport:
         Raises:
             PredictorError: a figure is beyond its limit; the message names both.
         """
-        for is_within, name, got, expected, cause in self._limits(config):
+
+        def require(is_within: bool, name: str, got: str, expected: str, cause: str) -> None:
             if not is_within:
                 raise PredictorError(f"predictor: {name}", got, expected, cause)
 
-    def _limits(self, config: Config) -> Iterator[tuple[bool, str, str, str, str]]:
-        """Whether a figure is within its limit, its name, itself, the limit, why it may not be."""
         cause = "too little data, or a plant that the data do not show; collect more"
         got = f"{self.error:.3f} of persistence"
-        yield self.error < 1.0, "held-out error", got, "below 1", cause
+        require(self.error < 1.0, "held-out error", got, "below 1", cause)
         limits = config.identification
         low, high = limits.gain_range
         expected = f"{low:g} … {high:g} of the physical response"
@@ -97,25 +97,22 @@ class GateReport:
         for robot, row in enumerate(self.gains, start=1):
             for time, gain in zip(GAIN_TIMES, row, strict=True):
                 name = f"height gain of r{robot} at {time:g} s"
-                yield low <= gain <= high, name, f"{gain:.2f}", expected, cause
+                require(low <= gain <= high, name, f"{gain:.2f}", expected, cause)
         if not find_kind(config.planner.kind).needs_peers:
             return
         kind, remedy = "cooperative", "leave planner.damping at 0, which chooses it"
         if not is_cooperative(config):
-            kind, remedy = (
-                "best-response",
-                "damp them by planner.damping, plan with planner.cost = ",
-            )
-            remedy += "'team', or, of a ridge fit, raise identification.block_weight"
+            kind, remedy = "best-response", "damp them by planner.damping, plan with planner.cost "
+            remedy += "= 'team', or, of a ridge fit, raise identification.block_weight"
         limit, cause = radius_limit(config), f"the agents' plans would diverge; {remedy}"
         name, got = f"radius of the {kind} map", f"{self.radius:.3f}"
-        yield self.radius < limit, name, got, f"below {limit:g}", cause
+        require(self.radius < limit, name, got, f"below {limit:g}", cause)
         expected = f"certainly at most {100 * limits.max_peers_harm:g} %"
         cause = "invented from noise: more data, or a larger identification.block_weight"
         for output, harm in self.harm.items():
             got = f"{100 * harm.value:.0f} % more squared error on held-out data than without it"
             within = not harm.low > limits.max_peers_harm
-            yield within, f"effect of peers on {output}", got, expected, cause
+            require(within, f"effect of peers on {output}", got, expected, cause)
 
 
 @dataclass(frozen=True, slots=True)
@@ -275,12 +272,8 @@ def held_out_error(predictor: Predictor, held_out: Sequence[Episode]) -> tuple[A
         squares[1] += ((future - last) ** 2).sum(axis=(0, 1)).T
         count += windows
     if count == 0:
-        raise PredictorError(
-            "held-out data",
-            "no episode that long",
-            f"at least {T_ini + N} samples",
-            "did every held-out walk end in a fall?",
-        )
+        expected, cause = f"at least {T_ini + N} samples", "did every held-out walk end in a fall?"
+        raise PredictorError("held-out data", "no episode that long", expected, cause)
     rmse, persistence = np.sqrt(squares / (count * n))
     ours, theirs = (np.linalg.norm(each / np.array(layout.y_scale)) for each in (rmse, persistence))
     return rmse, persistence, float(ours / theirs)
@@ -327,18 +320,16 @@ def height_gains(config: Config, predictor: Predictor) -> Array:
     N, n = layout.N, layout.agents
     physical = physical_height(config, N)
     rows = [min(round(1000 * time / SAMPLE_MS), N) - 1 for time in GAIN_TIMES]
-    by_phase: dict[int, list[int]] = {}
+    by_phase = defaultdict[int, list[int]](list)
     for step in walking_steps(config):
-        by_phase.setdefault(phase_of(config, step, predictor.phases), []).append(step)
+        by_phase[phase_of(config, step, predictor.phases)].append(step)
     gains = np.empty((len(by_phase), n, len(rows)))
-    for k, (phase, steps) in enumerate(by_phase.items()):
-        for robot in range(n):
-            patterns = np.array([horizon_stance(config, robot, step) for step in steps])
-            share = (patterns / patterns.sum(axis=2, keepdims=True)).mean(axis=0)
-            du = np.zeros((N, N_LEGS, 3))
-            du[:, :, 2] = _GAIN_FORCE * share
-            dy = predictor.future_block(robot, robot, phase) @ du.ravel()
-            gains[k, robot] = dy.reshape(N, layout.outputs)[rows, 0] / physical[rows]
+    for (k, (phase, steps)), robot in product(enumerate(by_phase.items()), range(n)):
+        patterns = np.array([horizon_stance(config, robot, step) for step in steps])
+        du = np.zeros((N, N_LEGS, 3))
+        du[:, :, 2] = _GAIN_FORCE * (patterns / patterns.sum(axis=2, keepdims=True)).mean(axis=0)
+        dy = predictor.future_block(robot, robot, phase) @ du.ravel()
+        gains[k, robot] = dy.reshape(N, layout.outputs)[rows, 0] / physical[rows]
     worst = np.abs(gains - 1.0).argmax(axis=0)
     greatest: Array = np.take_along_axis(gains, worst[None], axis=0)[0]
     return greatest
@@ -353,23 +344,19 @@ def physical_height(config: Config, N: int) -> Array:
     z'' = α F/m + (1 − α) a with α = 1/(1 + 2 γ₃/(γ₂ m²)).
     """
     controller, mass = config.controller, config.robot.mass
-    passed, share = 1.0, 1.0
+    passed = share = 1.0
     if config.planner.interface == "force":
-        stiffness = 2.0 * controller.gamma_defect / (controller.gamma_force * mass**2)
-        passed = 1.0 / (1.0 + stiffness)
+        passed = 1.0 / (1.0 + 2.0 * controller.gamma_defect / (controller.gamma_force * mass**2))
         share = 1.0 - passed
-    gains = (controller.ki_z, controller.kp_z, controller.kd_z)
     A = np.zeros((4, 4))  # ∫z, z, z', 1
     A[0, 1] = A[1, 2] = 1.0
     A[2, 3] = passed * _GAIN_FORCE / mass
-    A[2, :3] = -share * np.array(gains)
-    step = linalg.expm(A * SAMPLE_MS / 1000.0)
-    state = np.array([0.0, 0.0, 0.0, 1.0])
-    z = np.empty(N)
-    for k in range(N):
+    A[2, :3] = -share * np.array([controller.ki_z, controller.kp_z, controller.kd_z])
+    step, state, z = linalg.expm(A * SAMPLE_MS / 1000.0), np.array([0.0, 0.0, 0.0, 1.0]), []
+    for _ in range(N):
         state = step @ state
-        z[k] = state[1]
-    return z
+        z.append(state[1])
+    return np.array(z)
 
 
 def coupling_table(predictor: Predictor) -> Array:
@@ -437,13 +424,10 @@ def best_response_map(config: Config, predictor: Predictor, step: int) -> Array:
     ]
     for i, own in enumerate(problems):
         coupling = [
-            np.zeros_like(own.H)
-            if i == j
-            else own.gradient @ predictor.future_block(i, j, phase)[:, peer.columns]
+            (i != j) * (own.gradient @ predictor.future_block(i, j, phase)[:, peer.columns])
             for j, peer in enumerate(problems)
         ]
-        factor = linalg.cho_factor(own.H)
-        rows.append(-linalg.cho_solve(factor, np.concatenate(coupling, axis=1)))
+        rows.append(-linalg.cho_solve(linalg.cho_factor(own.H), np.concatenate(coupling, axis=1)))
     best, kept = np.concatenate(rows), kept_share(config)
     return best if kept == 0.0 else (1.0 - kept) * best + kept * np.eye(len(best))
 

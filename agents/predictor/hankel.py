@@ -11,14 +11,9 @@ from quadriga.shared.robots.conventions import Array
 
 
 def hankel(signal: Array, L: int) -> Array:
-    """H_L of eq. 2: column c stacks samples c … c+L−1.
+    """H_L of eq. 2 of a signal (T, m), T ≥ L: column c stacks samples c … c+L−1.
 
-    Args:
-        signal: shape (T, m), T ≥ L.
-        L: number of block rows.
-
-    Returns:
-        Shape (m L, T − L + 1).
+    Shape (m L, T − L + 1).
     """
     windows = sliding_window_view(signal, L, axis=0)  # (M, m, L)
     return windows.transpose(2, 1, 0).reshape(L * signal.shape[1], -1)
@@ -35,11 +30,7 @@ def mosaic(signals: Iterable[Array], L: int) -> Array:
 def split(u: Sequence[Array], y: Sequence[Array], T_ini: int, N: int) -> tuple[Array, ...]:
     """U_p, Y_p, U_f and Y_f of the Hankel matrices of several episodes (eq. 4).
 
-    Args:
-        u: inputs of each episode, (T, m).
-        y: outputs of each, (T, p).
-        T_ini: samples of the past.
-        N: samples of the future.
+    Inputs u are (T, m), outputs y (T, p) of each; T_ini samples of the past, N of the future.
     """
     U, Y = mosaic(u, T_ini + N), mosaic(y, T_ini + N)
     m, p = u[0].shape[1], y[0].shape[1]

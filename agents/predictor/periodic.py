@@ -9,11 +9,10 @@ nominal inputs (`fit_free`).
 from __future__ import annotations
 
 import operator
-from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import reduce
-from itertools import product
+from itertools import groupby, product
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -90,11 +89,9 @@ def harmonics(angle: Array, order: int) -> Array:
 
     Shape (*angle.shape, 2 order + 1).
     """
-    k = np.arange(1, order + 1) * angle[..., None]
+    k, shape = np.arange(1, order + 1) * angle[..., None], angle.shape
     waves = np.sqrt(2.0) * np.stack([np.cos(k), np.sin(k)], axis=-1)
-    return np.concatenate(
-        [np.ones((*angle.shape, 1)), waves.reshape(*angle.shape, 2 * order)], axis=-1
-    )
+    return np.concatenate([np.ones((*shape, 1)), waves.reshape(*shape, 2 * order)], axis=-1)
 
 
 def polynomials(angle: Array, degree: int) -> Array:
@@ -147,10 +144,6 @@ class PeriodicFactors:
     free: Array
     wrench: Array
 
-    def arrays(self) -> Mapping[str, Array]:
-        """The factors, by name."""
-        return {name: getattr(self, name) for name in FACTORS}
-
     def block(self, i: int, j: int, phase: int, phases: int) -> Array:
         """G_ij of one of `phases` equal parts of the period. Shape (p N, (m + p) T_ini + m N)."""
         free, components = self.free[:, i, j], len(self.wrench)
@@ -195,7 +188,9 @@ def fit_periodic(
         PredictorError: too little data, or a singular problem.
     """
     check_episodes(episodes, layout)
-    hold = _held_samples([episode.deviations()[0] for episode in episodes])
+    # For how many samples the inputs are held, everywhere in the data.
+    changes = [np.diff(_changes(episode.deviations()[0])) for episode in episodes]
+    hold = max(1, int(np.gcd.reduce(np.concatenate(changes))))
     walks = [_see(episode, layout, period, wrench, hold) for episode in episodes]
     h = estimate_response(walks, hold, layout, period.angle_step) if response is None else response
     free = fit_free(walks, h, layout)
@@ -219,11 +214,6 @@ class _Walk(NamedTuple):
     starts: Index  # samples with which a new draw of the inputs' noise begins; none without noise
 
 
-def _held_samples(inputs: Sequence[Array]) -> int:
-    """For how many samples the inputs (T, n, m) are held, everywhere in the data: 1 or more."""
-    return max(1, int(np.gcd.reduce(np.concatenate([np.diff(_changes(u)) for u in inputs]))))
-
-
 def _see(episode: Episode, layout: Layout, period: Period, wrench: Array, hold: int) -> _Walk:
     du, dy = episode.deviations()
     y_scale, changes = np.array(layout.y_scale), _changes(du)
@@ -245,10 +235,8 @@ def _past_rows(walk: _Walk, at: Index, length: int) -> Array:
 
     Shape (len(at), n · length · (w + p)): per agent all w, then all outputs.
     """
-    places = at[:, None] + np.arange(-length, 0)
-    parts = [
-        np.swapaxes(x[places], 1, 2).reshape(len(at), x.shape[1], -1) for x in (walk.w, walk.y)
-    ]
+    places, n = at[:, None] + np.arange(-length, 0), walk.w.shape[1]
+    parts = [np.swapaxes(x[places], 1, 2).reshape(len(at), n, -1) for x in (walk.w, walk.y)]
     return np.concatenate(parts, axis=2).reshape(len(at), -1)
 
 
@@ -321,7 +309,11 @@ def estimate_response(
         PredictorError: too little data.
     """
     n, rows = layout.agents, _rows(walks, _PAST, layout.N, starts=True)
-    folds = _fold(rows, layout.N, hold)
+    by_fold = groupby(rows, key=lambda part: part.fold)
+    folds = [
+        _total([_sum_response_rows(part.walk, part.at, layout.N, hold) for part in parts])
+        for _, parts in by_fold
+    ]
     if len(folds) < _LEAST_FOLDS:
         raise PredictorError(
             "data for the periodic predictor",
@@ -330,33 +322,19 @@ def estimate_response(
             "collect more: identification.seconds",
         )
     total = _total(folds)
-    without = [_Sums(*map(operator.sub, total, fold)) for fold in folds]
-    estimates = np.stack([_solve_lags(sums, n, hold) for sums in without])
-    response = shrink(_solve_lags(total, n, hold), estimates)
+    without = [_solve_lags(_Sums(*map(operator.sub, total, fold)), n, hold) for fold in folds]
+    response = shrink(_solve_lags(total, n, hold), np.stack(without))
     for i, members in enumerate(layout.members):
         response[:, :, [j for j in range(n) if j not in members], :, i] = 0.0
     return spread_over_samples(response, hold, angle_step)
-
-
-def _fold(rows: Sequence[_Rows], N: int, hold: int) -> list[_Sums]:
-    """Sums of the regression over `FOLDS` parts of the rows, one after the other in time."""
-    folds: defaultdict[int, list[_Sums]] = defaultdict(list)
-    for walk, at, fold in rows:
-        folds[fold].append(_sum_response_rows(walk, at, N, hold))
-    return [_total(parts) for parts in folds.values()]
 
 
 def _sum_response_rows(walk: _Walk, at: Index, N: int, hold: int) -> _Sums:
     pulse = _forced(walk, at, DEGREE)
     ahead = at[:, None] + np.linspace(0, N, _COMMANDS + 1).astype(int)[1:] - 1
     commands = walk.base[ahead] - walk.base[at - 1][:, None]
-    regressors = [
-        _past_rows(walk, at, _PAST),
-        harmonics(walk.angle[at], _MEAN_ORDER),
-        commands[:, :, 0].reshape(len(at), -1),
-        pulse,
-    ]
-    z = np.concatenate(regressors, axis=1)
+    past, mean = _past_rows(walk, at, _PAST), harmonics(walk.angle[at], _MEAN_ORDER)
+    z = np.concatenate([past, mean, commands[:, :, 0].reshape(len(at), -1), pulse], axis=1)
     later = [_forced(walk, at + s, DEGREE) for s in range(hold, N, hold)]
     kw = pulse.shape[1]
     zw = np.stack([z.T @ w for w in later]) if later else np.zeros((0, z.shape[1], kw))
@@ -384,12 +362,8 @@ def spread_over_samples(g: Array, hold: int, angle_step: float) -> Array:
     """Responses h to single samples that add up to the responses g to S samples in a row.
 
     g_l(θ) = Σ_m h_{l−m}(θ + m δ), m = 0 … S − 1: linear in the polynomials' coefficients. What it
-    leaves open is chosen smooth in the lag.
-
-    Args:
-        g: coefficients of the response to a held draw, (2 DEGREE + 2, N, …).
-        hold: S.
-        angle_step: δ, what the phase advances in a sample, rad.
+    leaves open is chosen smooth in the lag. The coefficients of g are (2 DEGREE + 2, N, …), `hold`
+    is S, `angle_step` δ, what the phase advances in a sample, rad.
     """
     if hold == 1:
         return g
@@ -420,12 +394,8 @@ def shrink(estimate: Array, without: Array) -> Array:
     max(0, 1 − v/|x̂|²) (James and Stein). A peer's effect on an output as a whole is left out if it
     is not significant, or small against the agent's own.
 
-    Args:
-        estimate: from all data, (k, N, n pushing, w, n responding, p).
-        without: from all folds but one, (F, k, N, n, w, n, p).
-
-    Returns:
-        The response, of the shape of `estimate`.
+    `estimate` is from all data, (k, N, n pushing, w, n responding, p), like the response, `without`
+    from all folds but one, (F, k, N, n, w, n, p).
     """
     F, n = len(without), estimate.shape[2]
     deviation = without - without.mean(axis=0)
@@ -466,20 +436,18 @@ def fit_free(walks: Sequence[_Walk], h: Array, layout: Layout) -> Array:
     x = np.zeros((n, p, waves * n * width, N))
     for i, members in enumerate(layout.members):
         own, every = np.flatnonzero(agent == i), np.flatnonzero(np.isin(agent, members))
-        with_peers = [(every, on_peers) for on_peers in _ON_PEERS if len(members) > 1]
+        choices = [(own, 1.0), *((every, on_peers) for on_peers in _ON_PEERS if len(members) > 1)]
         candidates = []
-        for columns, on_peers in ((own, 1.0), *with_peers):
+        for (columns, on_peers), ridge, on_harmonics in product(choices, _RIDGES, _ON_HARMONICS):
             scale = np.where(agent[columns] == i, 1.0, on_peers)
-            for ridge, on_harmonics in product(_RIDGES, _ON_HARMONICS):
-                penalty = ridge * np.where(wave[columns] > 0, on_harmonics, 1.0) * scale
-                candidates.append((columns, penalty))
+            penalty = ridge * np.where(wave[columns] > 0, on_harmonics, 1.0) * scale
+            candidates.append((columns, penalty))
         best = np.zeros(p, dtype=np.int64)
         if len(sums) == 2:
             best = _choose_penalties(sums[0], sums[1], i, candidates)
         for k in np.unique(best).tolist():
-            solution = _solve_free(_total(sums), i, *candidates[k])
-            for output in np.flatnonzero(best == k).tolist():
-                x[i, output, candidates[k][0]] = solution[:, :, output]
+            solution, chosen = _solve_free(_total(sums), i, *candidates[k]), best == k
+            x[i][np.ix_(chosen, candidates[k][0])] = solution[:, :, chosen].transpose(2, 0, 1)
     blocks = x.reshape(n, p, waves, n, width, N).transpose(2, 0, 3, 5, 1, 4)
     return blocks.reshape(waves, n, n, N * p, width)
 

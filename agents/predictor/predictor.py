@@ -19,7 +19,7 @@ from quadriga.agents.predictor.episode import (
     team_layout,
     wrench_map,
 )
-from quadriga.agents.predictor.periodic import Period, PeriodicFactors, fit_periodic
+from quadriga.agents.predictor.periodic import FACTORS, Period, PeriodicFactors, fit_periodic
 from quadriga.agents.predictor.regression import (
     check_excitation,
     normal_equations,
@@ -83,14 +83,9 @@ class PredictorMeta:
             for section, keys in _KEYS.items()
             for key in keys
         }
+        known |= {"kind": config.identification.predictor, "response": config.response_file}
         controller = {k: v for k, v in asdict(config.controller).items() if k not in _SAFETY_KEYS}
-        return cls(
-            kind=config.identification.predictor,
-            phases=1,
-            controller=tuple(sorted(controller.items())),
-            response=config.response_file,
-            **known,
-        )
+        return cls(phases=1, controller=tuple(sorted(controller.items())), **known)
 
     def to_dict(self) -> dict[str, Any]:
         """A dictionary that can be written as JSON."""
@@ -106,10 +101,9 @@ class PredictorMeta:
         Raises:
             TypeError, AttributeError, KeyError: fields are missing, unknown or of another type.
         """
-        changes: dict[str, Any] = {"controller": tuple(sorted(body["controller"].items()))}
-        if "plant" in body:
-            changes["plant"] = Layout(**{k: as_tuples(v) for k, v in body["plant"].items()})
-        return cls(**body | changes)
+        plant, controller = body.get("plant"), tuple(sorted(body["controller"].items()))
+        layout = plant and Layout(**{k: as_tuples(v) for k, v in plant.items()})
+        return cls(**body | {"controller": controller, "plant": layout})
 
     @property
     def layout(self) -> Layout:
@@ -206,7 +200,9 @@ class Predictor:
 
     def arrays(self) -> Mapping[str, Array]:
         """What it is made of, by name: with the meta all that a file must hold."""
-        return self.parts.arrays() if isinstance(self.parts, PeriodicFactors) else {"G": self.parts}
+        if isinstance(self.parts, PeriodicFactors):
+            return {name: getattr(self.parts, name) for name in FACTORS}
+        return {"G": self.parts}
 
     def predict(self, z: Array, phase: int = 0) -> Array:
         """Predicted output deviations of all agents.
@@ -289,12 +285,8 @@ def fit(
     - periodic: a function of the phase in which no input acts backwards, see `periodic`; of a team
       that of the gait, with peers by their net wrench.
 
-    Args:
-        episodes: of the plant.
-        meta: what is fitted.
-        wrench: of `periodic`, from an agent's inputs to what they act by, (w, m); None: of the
-            robot.
-        response: of `periodic`, what stands for a fitted one, see `fit_periodic`.
+    Of `periodic` are `wrench`, from an agent's inputs to what they act by, (w, m), None: of the
+    robot, and `response`, which stands for a fitted one, see `fit_periodic`.
 
     Raises:
         PredictorError: no data, too little, of another plant, or a singular problem.

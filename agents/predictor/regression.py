@@ -23,15 +23,13 @@ _RANK_TOLERANCE: Final = 1e-12
 
 
 def check_excitation(inputs: Sequence[Array], order: int) -> None:
-    """Refuse inputs from which the plant's response cannot be told.
+    """Refuse inputs, per episode (T, m), from which the plant's response cannot be told.
 
-    Args:
-        inputs: per episode shape (T, m).
-        order: block rows; for the fundamental lemma the horizon plus the plant's order.
+    For the fundamental lemma `order` is the horizon plus the plant's order.
 
     Raises:
-        PredictorError: together they are not persistently exciting of this order: the rank of
-            their Hankel matrix is below m · order (definition 1).
+        PredictorError: together they are not persistently exciting of this order: the rank of their
+            Hankel matrix is below m · order (definition 1).
     """
     S = gram(inputs, order)
     S.flat[:: len(S) + 1] -= _RANK_TOLERANCE * float(np.linalg.norm(S))
@@ -66,13 +64,11 @@ def normal_equations(episodes: Sequence[Episode], layout: Layout) -> Regression:
     Raises:
         PredictorError: no data, too little, or of another plant.
     """
-    S, windows = _sample_gram(episodes, layout)
-    n, m, p = layout.agents, layout.inputs, layout.outputs
-    index = np.arange(len(S)).reshape(-1, n * (m + p))
-    past, future = index[: layout.T_ini], index[layout.T_ini :]
-    parts = ((past[:, : n * m], m), (past[:, n * m :], p), (future[:, : n * m], m))
-    inputs = np.concatenate([_by_agent(part, n, dim) for part, dim in parts], axis=1).ravel()
-    outputs = _by_agent(future[:, n * m :], n, p).ravel()
+    S, windows, (u, y) = _sample_gram(episodes, layout)
+    n, T_ini = layout.agents, layout.T_ini
+    parts = u[:, :T_ini], y[:, :T_ini], u[:, T_ini:]
+    inputs = np.concatenate([part.reshape(n, -1) for part in parts], axis=1).ravel()
+    outputs = y[:, T_ini:].ravel()
     zz, zy = S[np.ix_(inputs, inputs)], S[np.ix_(inputs, outputs)]
     return Regression(zz, zy.reshape(len(inputs), n, -1), windows)
 
@@ -138,17 +134,19 @@ def to_physical(x: Array, layout: Layout) -> Array:
     return np.ascontiguousarray(blocks * y_scale[:, None] / z_scale)
 
 
-def _sample_gram(episodes: Sequence[Episode], layout: Layout) -> tuple[Array, int]:
-    """Gram matrix of windows of scaled [u of all agents; y of all], and how many windows."""
+def _sample_gram(
+    episodes: Sequence[Episode], layout: Layout
+) -> tuple[Array, int, tuple[Index, Index]]:
+    """Gram matrix of windows of scaled [u of all agents; y of all], and how many windows.
+
+    Also the places of u, (n, L, m), and of y, (n, L, p), in it.
+    """
     check_episodes(episodes, layout)
     signals = [np.concatenate(each.scaled_deviations(layout), axis=1) for each in episodes]
-    L = layout.T_ini + layout.N
-    return gram(signals, L), sum(each.samples - L + 1 for each in episodes)
-
-
-def _by_agent(index: Index, n: int, dim: int) -> Index:
-    """Reorder stacked (time, agent, dim) indices to one row of (time, dim) per agent."""
-    return index.reshape(-1, n, dim).transpose(1, 0, 2).reshape(n, -1)
+    L, n, inputs = layout.T_ini + layout.N, layout.agents, layout.agents * layout.inputs
+    index = np.arange(L * signals[0].shape[1]).reshape(L, -1)
+    u, y = (part.reshape(L, n, -1).swapaxes(0, 1) for part in np.split(index, [inputs], axis=1))
+    return gram(signals, L), sum(each.samples - L + 1 for each in episodes), (u, y)
 
 
 def _columns_of(members: Sequence[int], layout: Layout) -> Index:
@@ -200,13 +198,8 @@ def reduce(episodes: Sequence[Episode], layout: Layout) -> Reduction:
     Raises:
         PredictorError: no data, too little, of another plant, or inputs that do not excite.
     """
-    S, _ = _sample_gram(episodes, layout)
-    n, m, p, T_ini = layout.agents, layout.inputs, layout.outputs, layout.T_ini
-    index = np.arange(len(S)).reshape(-1, n * (m + p))
-    a, b = (
-        np.concatenate([_by_agent(part, n, dim).ravel() for part in (x[:T_ini], x[T_ini:])])
-        for x, dim in ((index[:, : n * m], m), (index[:, n * m :], p))
-    )
+    (S, _, places), T_ini = _sample_gram(episodes, layout), layout.T_ini
+    a, b = (np.concatenate([x[:, :T_ini].ravel(), x[:, T_ini:].ravel()]) for x in places)
     S_aa, S_ab = S[np.ix_(a, a)], S[np.ix_(a, b)]
     check_excitation([each.scaled_deviations(layout)[0] for each in episodes], T_ini + layout.N)
     factor = linalg.cho_factor(S_aa, check_finite=False)
