@@ -28,7 +28,7 @@ from quadriga.shared.link.ticks import TickBatch
 from quadriga.shared.messages import Command, Message, State
 from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.clock import log_ns, monotonic, monotonic_ns
-from quadriga.shared.runtime.scheduling import at_work
+from quadriga.shared.runtime.scheduling import at_work, give_way
 from quadriga.shared.runtime.signals import interruptible
 from quadriga.shared.topics import (
     AGENT_EVENT,
@@ -192,6 +192,7 @@ class AgentShell:
         self._send(tick, received.state)
         inbox.pass_state(tick)
         if due:
+            give_way()  # another robot's answer is due before this one's plan
             state = State.from_row(tick, 1_000_000 * tick, received.state.copy())
             self._memory = self._step(self._memory_now(), state, plain.acted, begun)
         else:
