@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from quadriga.agents.agent import Agent, AgentState, Inputs, Outputs
-from quadriga.agents.estimator.robot_state import RobotState
 from quadriga.agents.predictor.predictor import Predictor
 from quadriga.identification.rollout import Rollout
 from quadriga.shared.codec import encode
@@ -19,13 +18,6 @@ class AgentTick:
 
     payload: bytes
     inputs: Inputs
-
-
-@dataclass(frozen=True, slots=True)
-class TsidCase:
-    """The inputs of the whole-body part at one tick: of the state, what was asked of the QP."""
-
-    state: RobotState
 
 
 def record(config: Config, predictor: Predictor | None) -> list[AgentTick]:

@@ -34,19 +34,15 @@ def planner(options: Options, console: Console, tell: Tell) -> Part:
 
 
 def low_level(options: Options, console: Console, tell: Tell) -> Part:
-    """The tick of one robot's low level, and its whole-body part against TSID's."""
-    from benchmarks import low_level, low_level_ticks, low_level_tsid
+    """The tick of one robot's low level."""
+    from benchmarks import low_level, low_level_ticks
     from benchmarks.children import result_of
 
     seconds, passes = (0.5, 1) if options.quick else (2.5, 3)
     config, _, predictor = team(options, options.middle, seconds, console)
     ticks = low_level_ticks.record(config, predictor)
     tell("ticks")
-    figures: Part = result_of(low_level.measure, config, predictor, ticks, passes)
-    tell("against TSID")
-    cases = low_level_tsid.cases(config, predictor, ticks)
-    figures["tsid"] = low_level_tsid.compare(config, cases)
-    return figures
+    return dict(result_of(low_level.measure, config, predictor, ticks, passes))
 
 
 def bus(options: Options, _console: Console, tell: Tell) -> Part:

@@ -38,7 +38,6 @@ from benchmarks.planner_contenders import (
     TeamDeepc,
     is_at_bound,
 )
-from benchmarks.planner_peer import AVAILABLE, CvxpyDeepc
 from benchmarks.planner_ticks import PlanningTick, record
 from quadriga.agents.planner.qp import PlannerProblem
 from quadriga.agents.predictor.gates import load_checked
@@ -151,35 +150,18 @@ def record_walks(
 
 
 def deepc(robots: int, options: argparse.Namespace, console: Console) -> list[Row]:
-    """Eq. 5 for a team of this size, with CVXPY for one robot where it is installed."""
+    """Eq. 5 for a team of this size."""
     config, _, walks = record_walks(robots, options.seconds, console, options.seed)
     episodes = ensure_data(config, console).training
-    extra = []
-    if robots == 1 and AVAILABLE:
-        peer = CvxpyDeepc(config.planner, episodes)
-        extra.append(
-            Contender(
-                "eq. 5",
-                "cvxpy",
-                lambda case: peer.solve(
-                    case.tick.past.ravel(), case.y_des, case.tick.stance, case.tick.nominal
-                ),
-            )
-        )
-    elif robots == 1:
-        console.print("eq. 5 with CVXPY: left out, cvxpy is not installed (pip install cvxpy)")
     last = [walk[-DEEPC_STEPS.get(robots, 1) :] for walk in walks]
-    return measure(config, TeamDeepc(config, episodes), last, extra)
+    return measure(config, TeamDeepc(config, episodes), last)
 
 
 def measure(
-    config: Config,
-    formulation: Formulation,
-    walks: Sequence[Sequence[PlanningTick]],
-    extra: Sequence[Contender] = (),
+    config: Config, formulation: Formulation, walks: Sequence[Sequence[PlanningTick]]
 ) -> list[Row]:
     """Run every contender on every case, another one first each time; one row per contender."""
-    contenders = [*formulation.contenders(), *extra]
+    contenders = formulation.contenders()
     cases = [case for walk in walks for tick in walk for case in formulation.cases(tick)]
     bound: list[bool] = []
     for case in formulation.cases(walks[0][0]):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import tempfile
 import threading
 from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Self
@@ -52,26 +51,16 @@ def alone(config: Config, predictor: Predictor | None) -> dict[str, float]:
     }
 
 
-Beside = Callable[[Path], AbstractContextManager[object]]  # of a run folder
-
-
 def over_the_bus(
-    config: Config,
-    file: Path | None,
-    predictor: Predictor | None,
-    tell: Callable[[str], None],
-    beside: Beside = nullcontext,
+    config: Config, file: Path | None, predictor: Predictor | None, tell: Callable[[str], None]
 ) -> dict[str, Any]:
     """Walk as `quadriga walk` does: real-time factor, µs of a tick, memory of each process.
-
-    `rtf_half` is the factor over the second half of the world time alone.
 
     Args:
         config: the team's configuration; its endpoint is replaced by a free one.
         file: of the predictor; None without a planner.
         predictor: the content of the file.
         tell: called with the progress of the walk.
-        beside: what is there beside the team; given the run folder, which has the configuration.
 
     Raises:
         ProcessError: a process failed or left too early.
@@ -83,7 +72,7 @@ def over_the_bus(
         (folder / CONFIG).write_text(to_toml(config), encoding="utf-8")
         rows = process_table(config, folder, file, sha256)
         memory: dict[str, dict[str, float]] = {}
-        with Launch(rows, folder / "logs") as launch, _Watch(config) as watch, beside(folder):
+        with Launch(rows, folder / "logs") as launch, _Watch(config) as watch:
 
             def look() -> bool:
                 tell(f"{watch.seconds:.1f}/{config.world.duration:g} s")
@@ -93,13 +82,7 @@ def over_the_bus(
 
             launch.watch(look)
     factor = watch.factor()
-    return {
-        "rtf": factor,
-        "rtf_half": watch.factor(0.5 * watch.seconds),
-        "tick_us": 1e3 / factor,
-        "seconds": watch.seconds,
-        "memory_mb": memory,
-    }
+    return {"rtf": factor, "tick_us": 1e3 / factor, "seconds": watch.seconds, "memory_mb": memory}
 
 
 def resident_mb(pid: int) -> float | None:
@@ -149,10 +132,9 @@ class _Watch:
         """World time of the newest ground truth."""
         return self._seen[-1][0] if self._seen else 0.0
 
-    def factor(self, since: float = 0.0) -> float:
-        """World time over elapsed time, from a world time on, s."""
-        seen = [look for look in self._seen if look[0] >= since]
-        (world, clock), (world_end, clock_end) = seen[0], seen[-1]
+    def factor(self) -> float:
+        """World time over elapsed time."""
+        (world, clock), (world_end, clock_end) = self._seen[0], self._seen[-1]
         return (world_end - world) / (clock_end - clock)
 
     def _listen(self) -> None:

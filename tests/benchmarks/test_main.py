@@ -15,7 +15,6 @@ from tests.listening import await_true
 from tests.quadriga.experiments.processes import await_gone, children
 
 TOP = Path(__file__).parents[2]
-NO_TSID = "raise ImportError('not installed')\n"
 
 
 def command(out: Path, *words: str) -> list[str]:
@@ -30,11 +29,7 @@ def run(out: Path, *words: str) -> tuple[str, dict[str, Any]]:
     return done.stdout, json.loads(out.read_text(encoding="utf-8"))
 
 
-def test_parts_print_their_lines_and_write_their_figures(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "tsid.py").write_text(NO_TSID, encoding="utf-8")
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=":")
+def test_parts_print_their_lines_and_write_their_figures(tmp_path: Path) -> None:
     parts = ("low-level", "bus", "recorder")
     page, found = run(tmp_path / "b.json", *parts, "--planner", "none", "--robots", "1")
     assert all(name in page for name in parts)
@@ -44,8 +39,6 @@ def test_parts_print_their_lines_and_write_their_figures(
     share = sum(stages.values()) / found["low_level_us_median"]
     assert 0.3 < share < 3.0, "the stages, from passes of their own, make up the tick"
     assert min(stages.values()) > 0.0
-    assert found["low_level_vs_tsid"] is None
-    assert "`import tsid` fails" in page
     (row,) = found["parts"]["bus"]["rows"]
     assert row["bus"]["median"] > 0.0
     assert row["socket"]["median"] > 0.0
