@@ -2,9 +2,6 @@
 
 `python -m benchmarks.endurance` walks two robots for 30 minutes, prints the memory of each process
 over time, and ends with 1 if one grew by more than 5 %, a robot fell or the recording has a gap.
-
-A computer that is too slow for the team in real time may walk it in slow motion: `--speed 0.5` lets
-all of its processes' clocks go half as fast, so that the same 30 minutes last an hour.
 """
 
 from __future__ import annotations
@@ -18,7 +15,6 @@ from typing import Final
 
 from rich.console import Console
 
-from benchmarks.slow_motion import in_slow_motion, read_speed
 from benchmarks.walks import resident_mb
 from quadriga.identification.predictors import ensure_predictor
 from quadriga.recordings.summary import summarise
@@ -52,7 +48,6 @@ def main() -> int:
     parser.add_argument("--robots", type=int, default=2)
     parser.add_argument("--planner", default="distributed")
     parser.add_argument("--seed", type=int, default=0, help="of the world")
-    parser.add_argument("--speed", type=read_speed, default=1.0, help="of the clocks, at most 1")
     parser.add_argument("--out", type=Path, metavar="DIR", help="run folder (runs/<date>-<time>)")
     given = parser.parse_args()
     interrupt_on_sigterm()
@@ -66,7 +61,7 @@ def main() -> int:
             "gait.stand_ms": _STAND_MS,
             "team.auto_resume": True,
         }
-        return endure(load(None, keys), given.out, Console(highlight=False), given.speed)
+        return endure(load(None, keys), given.out, Console(highlight=False))
     except QuadrigaError as error:
         print(f"endurance: {error}", file=sys.stderr)
         return 2
@@ -74,7 +69,7 @@ def main() -> int:
         return _INTERRUPTED
 
 
-def endure(config: Config, out: Path | None, console: Console, speed: float = 1.0) -> int:
+def endure(config: Config, out: Path | None, console: Console) -> int:
     """Walk once and judge; 0 if nothing grew, nothing was lost and nobody fell."""
     folder = make_run_dir(out)
     warm_up(config, console)
@@ -83,7 +78,7 @@ def endure(config: Config, out: Path | None, console: Console, speed: float = 1.
         predictor = ensure_predictor(config, console)
     config = replace(config, bus=replace(config.bus, endpoint=free_endpoint()))
     (folder / CONFIG).write_text(to_toml(config), encoding="utf-8")
-    samples = _walk(config, folder, predictor, console, speed)
+    samples = _walk(config, folder, predictor, console)
     summary = summarise(folder)
     growth = {name: grown(found) for name, found in samples.items()}
     print_tables([_table(samples, growth)])
@@ -98,14 +93,10 @@ def endure(config: Config, out: Path | None, console: Console, speed: float = 1.
     return int(bool(summary["fallen"]) or lost > 0 or max(growth.values(), default=0.0) > _MOST)
 
 
-def _walk(
-    config: Config, folder: Path, predictor: Path | None, console: Console, speed: float
-) -> Samples:
+def _walk(config: Config, folder: Path, predictor: Path | None, console: Console) -> Samples:
     samples: Samples = {}
-    begun, total = monotonic(), config.world.duration / speed
+    begun, total = monotonic(), config.world.duration
     rows = process_table(config, folder, predictor, "")
-    if speed < 1.0:
-        rows = tuple(in_slow_motion(row, speed) for row in rows)
     with Launch(rows, folder / "logs") as launch:
         next_look = begun
 

@@ -17,7 +17,6 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from benchmarks.slow_motion import in_slow_motion
 from quadriga.replay.outcome import format_outcome
 from quadriga.replay.team_replay import replay
 from quadriga.shared.bus.session import Bus
@@ -34,6 +33,7 @@ from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import QUADRIGA, Launch, ProcessSpec, process_table
 from quadriga.warm_up import warm_up
 from tests.listening import WAIT, await_true
+from tests.runtime.slow_motion import in_slow_motion
 
 BEGUN = "0 ms: start "  # in the log of a plant that drives time: all are there, and walk
 # Less than a team collects by default, which takes minutes; for all tests the same, so that they

@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from benchmarks.slow_motion import in_slow_motion
 from quadriga.agents.predictor.gates import load_checked as load_predictor
 from quadriga.agents.predictor.store import predictor_sha256
 from quadriga.commands.parser import main
@@ -35,6 +34,7 @@ from quadriga.what_if.what_if import Branch, WhatIf, answer_what_if
 from tests.listening import WAIT
 from tests.quadriga.replay.rewritten import planted_bit, rewritten, without
 from tests.runtime.conftest import DATA, REAL_TIME, SPEED
+from tests.runtime.slow_motion import in_slow_motion
 
 pytestmark = pytest.mark.usefixtures("_compiled")
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.slow_motion import in_slow_motion
 from quadriga.team.launch import ProcessSpec
+from tests.runtime.slow_motion import in_slow_motion
 
 
 def test_a_process_of_the_table_runs_by_them(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""A module that runs in slow motion: `python -m benchmarks.slow_motion SPEED MODULE …`.
+"""A module that runs in slow motion: `python -m tests.runtime.slow_motion SPEED MODULE …`.
 
 Robots fall, and rightly, where a computer is too slow for their team in real time. Slow motion
 leaves such a computer time for each tick: all clocks that this project reads run at a share `SPEED`
@@ -7,7 +7,6 @@ of their speed, in all processes from the same origin. Those of Zenoh's own thre
 
 from __future__ import annotations
 
-import argparse
 import runpy
 import sys
 import time
@@ -45,39 +44,13 @@ class SlowTime:
 
 
 def in_slow_motion(row: ProcessSpec, speed: float) -> ProcessSpec:
-    """The same process by slow clocks.
-
-    Args:
-        row: of the launcher's table; it runs a module.
-        speed: of the clocks, as a share of their own, at most 1.
-    """
+    """The same process of the launcher's table by slow clocks; `speed` is a share, at most 1."""
     module = row.command.index("-m") + 1  # without -P: this module lies in the working directory
     words = (row.command[0], "-m", __name__, str(speed), *row.command[module:])
     return replace(row, command=words)
 
 
-def read_speed(text: str) -> float:
-    """The speed of a command line.
-
-    Raises:
-        argparse.ArgumentTypeError: it is no share above 0 and at most 1.
-    """
-    try:
-        speed = float(text)
-    except ValueError:
-        speed = 0.0
-    if not 0.0 < speed <= 1.0:
-        raise argparse.ArgumentTypeError(f"got {text}, expected a share above 0 and at most 1")
-    return speed
-
-
-def main() -> None:
-    """Run the module with its arguments, by slow clocks."""
-    speed, module, *words = sys.argv[1:]
-    vars(clock)["time"] = SlowTime(float(speed))
-    sys.argv = [module, *words]
-    runpy.run_module(module, run_name="__main__", alter_sys=True)
-
-
 if __name__ == "__main__":
-    main()
+    vars(clock)["time"] = SlowTime(float(sys.argv[1]))
+    sys.argv = sys.argv[2:]
+    runpy.run_module(sys.argv[0], run_name="__main__", alter_sys=True)
