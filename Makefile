@@ -9,7 +9,7 @@ MANUAL := $(VENV)/.manual
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 ARGS ?=
 
-.PHONY: install tools walk prepared test nightly test-containers image-lock lint endurance format docs dist pages manual links gallery figures clip acceptance bench bench-against bench-planner bench-recorder
+.PHONY: install tools walk prepared test nightly test-containers image-lock lint endurance format docs dist pages manual links gallery figures clip acceptance bench bench-against
 
 install: $(STAMP)
 
@@ -136,8 +136,8 @@ acceptance: $(STAMP)
 			|| exit 1; \
 	done
 
-# What everything costs, on one page, in runs/bench.json and runs/bench.png; some three minutes, and
-# as many more for each team that has not walked here before (ten robots: much more).
+# What everything costs, on one page and in runs/bench.json; some five minutes, and as many
+# more for each team that has not walked here before (ten robots: much more).
 bench: $(STAMP)
 	$(BIN)/python -m benchmarks $(ARGS)
 
@@ -145,12 +145,3 @@ bench: $(STAMP)
 # make bench-against ARGS=HEAD~10
 bench-against: $(STAMP)
 	$(BIN)/python -m benchmarks.against $(ARGS)
-
-# What a plan costs, as the paper writes it and as it is solved here; about ten minutes, and five
-# more for a team of five that has not walked here before.
-bench-planner: $(STAMP)
-	$(BIN)/python -m benchmarks.planner $(ARGS)
-
-# Whether the recorder keeps up with 20,000 messages a second; some ten seconds.
-bench-recorder: $(STAMP)
-	$(BIN)/python -m benchmarks recorder $(ARGS)

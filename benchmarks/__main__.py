@@ -2,7 +2,7 @@
 
 Run: python -m benchmarks [PART ...] [--robots 1 2 3 5 10] [--seconds 4] [--out FILE]
 
-Prints a page, writes FILE (JSON) and beside it a picture. Each part is measured with real processes
+Prints a page and writes FILE (JSON). Each part is measured with real processes
 and real walks on this machine. Other programs change the figures, so run none. For a team that has
 not walked here before, data are collected and a predictor is fitted first, which takes minutes for
 ten robots; `--planner none` walks without a predictor. `--quick` only shows that all parts work.
@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks import blas_threads
-from benchmarks.options import Options
+from benchmarks.parts import PARTS, Options, add_prefix
 from quadriga.shared.errors import QuadrigaError
 from quadriga.shared.planner_kinds import BUILT_IN
 from quadriga.shared.runtime.clock import monotonic, wall_ns
@@ -33,7 +33,7 @@ INTERRUPTED = 130
 
 
 def main() -> int:
-    """Measure, print, write and draw; 0 if every part could be measured."""
+    """Measure, print and write; 0 if every part could be measured."""
     interrupt_on_sigterm()
     try:
         return run_parts(parse_options())
@@ -46,9 +46,7 @@ def run_parts(options: Options) -> int:
     """Run every part in turn, then build the page."""
     from rich.console import Console
 
-    from benchmarks.figure import draw
     from benchmarks.page import headline, section, targets
-    from benchmarks.parts import PARTS, add_prefix
 
     console = Console(width=120, highlight=False)
     result: dict[str, Any] = {"machine": describe_machine(), "quick": options.quick}
@@ -67,10 +65,9 @@ def run_parts(options: Options) -> int:
     figures = headline(parts)
     result |= {**figures, "parts": parts, "failed": failed, "seconds": monotonic() - begun}
     options.out.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
-    picture = draw(parts, options.out.with_suffix(".png"))
     if not options.quick:
         console.print(targets(figures))
-    console.print(f"{options.out}, {picture}; {result['seconds']:.0f} s", markup=False)
+    console.print(f"{options.out}; {result['seconds']:.0f} s", markup=False)
     return int(bool(failed))
 
 
@@ -98,8 +95,6 @@ def describe_machine() -> dict[str, Any]:
 
 def parse_options(words: Sequence[str] | None = None) -> Options:
     """The command line."""
-    from benchmarks.parts import PARTS
-
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks", description=__doc__.splitlines()[0]
     )
@@ -112,6 +107,7 @@ def parse_options(words: Sequence[str] | None = None) -> Options:
         help="sizes of the teams that walk",
     )
     parser.add_argument("--seconds", type=float, default=4.0, help="length of each walk")
+    parser.add_argument("--seed", type=int, default=1, help="of the worlds of the part planner")
     parser.add_argument(
         "--planner",
         default="distributed",
@@ -133,9 +129,7 @@ def parse_options(words: Sequence[str] | None = None) -> Options:
     if given.out.is_dir() or not os.access(folder, os.W_OK):
         parser.error(f"--out {given.out}: expected a file that can be written")
     chosen = tuple(name for name in PARTS if name in given.parts or not given.parts)
-    return Options(
-        chosen, tuple(given.robots), given.seconds, given.planner, given.quick, given.out
-    )
+    return Options(**vars(given) | {"parts": chosen, "robots": tuple(given.robots)})
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """The paper's problems as written there, solved by sparse OSQP; for comparison only.
 
-Eq. 12 for one agent, eq. 7 for a whole team, eq. 5 with g and σ. Outputs stay variables, swing
+Eq. 12 for one agent and eq. 7 for a whole team. Outputs stay variables, swing
 legs are variables bounded to zero, and one solver object is updated and warm-started from tick to
 tick, so an answer depends on the ticks before it. Forces and outputs are deviations, as in the
 planner; the cost is halved and without its constant part.
@@ -8,7 +8,7 @@ planner; the cost is halved and without its constant part.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
@@ -18,8 +18,6 @@ import osqp
 from numpy.typing import NDArray
 from scipy import sparse
 
-from quadriga.agents.predictor.episode import U_SCALE, Y_SCALE, Episode, team_layout
-from quadriga.agents.predictor.hankel import split
 from quadriga.shared.config.sections import PlannerConfig
 from quadriga.shared.robots.conventions import N_FORCES, N_OUTPUTS, Array
 
@@ -43,13 +41,11 @@ class Written:
         u: force deviations, shape (n, N, 12), N.
         y: output deviations, shape (n, N, 6), m, m/s, rad, rad/s.
         status: as OSQP reports it; u and y may be NaN unless it is "solved".
-        iterations: OSQP's count.
     """
 
     u: Array
     y: Array
     status: str
-    iterations: int
 
 
 class PaperQp:
@@ -84,83 +80,14 @@ class PaperQp:
             stance: scheduled stance, shape (n, N, 4).
             nominal: forces that deviations are counted from, shape (n, N, 12), N.
         """
-        lower, upper = force_bounds(self._config, stance, nominal)
+        lower, upper = _force_bounds(self._config, stance, nominal)
         Q = _Q(self._config, len(y_des) // N_OUTPUTS)
-        x, status, iterations = self._solver.solve(
+        x, status = self._solver.solve(
             np.concatenate([np.zeros(self._forces), -Q * y_des]),
             np.concatenate([y_free, lower]),
             np.concatenate([y_free, upper]),
         )
-        return _unpack(x, stance, status, iterations)
-
-
-class DeepcQp:
-    """Eq. 5 for a team: variables u, y, g and σ; forms the Hankel matrices.
-
-    Args:
-        config: T_ini, N, weights, friction, bounds.
-        episodes: data of one team.
-        lambda_g, lambda_sigma: λ_g and λ_σ, on scaled deviations (`Episode.scaled_deviations`).
-        settings: OSQP's.
-    """
-
-    def __init__(
-        self,
-        config: PlannerConfig,
-        episodes: Sequence[Episode],
-        lambda_g: float,
-        lambda_sigma: float,
-        settings: Mapping[str, float] = DEFAULT,
-    ) -> None:
-        self._config, n = config, episodes[0].u.shape[1]
-        T_ini, N = config.T_ini, config.N
-        layout = team_layout(n, T_ini, N)
-        u, y = zip(*(episode.scaled_deviations(layout) for episode in episodes), strict=True)
-        U_p, Y_p, U_f, Y_f = (
-            _robots_first(part, n, size)
-            for part, size in zip(split(u, y, T_ini, N), (N_FORCES, N_OUTPUTS) * 2, strict=True)
-        )
-        P = sparse.diags_array(
-            np.concatenate(
-                [
-                    _R(config, n * N),
-                    _Q(config, n * N),
-                    np.full(U_p.shape[1], lambda_g),
-                    np.full(len(Y_p), lambda_sigma),
-                ]
-            )
-        )
-        U = sparse.eye_array(len(U_f)) / U_SCALE
-        Y = sparse.diags_array(1.0 / np.tile(Y_SCALE, n * N))
-        rows: list[list[sparse.sparray | None]] = [
-            [None, None, sparse.csc_array(U_p), None],
-            [None, None, sparse.csc_array(Y_p), sparse.eye_array(len(Y_p))],
-            [-U, None, sparse.csc_array(U_f), None],
-            [None, -Y, sparse.csc_array(Y_f), None],
-            [_force_rows(config, n * N), None, None, None],
-        ]
-        self._solver = WarmOsqp(P, sparse.block_array(rows), settings)
-        self._free = U_p.shape[1] + len(Y_p)
-
-    def solve(self, past: Array, y_des: Array, stance: Stance, nominal: Array) -> Written:
-        """One tick; `past` stacks [u_ini; y_ini] per robot, shape (18 n T_ini,); see `PaperQp`."""
-        n, T_ini = len(stance), self._config.T_ini
-        u_ini, y_ini = np.split(past.reshape(n, -1), [N_FORCES * T_ini], axis=1)
-        lower, upper = force_bounds(self._config, stance, nominal)
-        known = np.concatenate(
-            [
-                u_ini.ravel() / U_SCALE,
-                y_ini.ravel() / np.tile(Y_SCALE, n * T_ini),
-                np.zeros(nominal.size + len(y_des)),
-            ]
-        )
-        Q = _Q(self._config, len(y_des) // N_OUTPUTS)
-        x, status, iterations = self._solver.solve(
-            np.concatenate([np.zeros(nominal.size), -Q * y_des, np.zeros(self._free)]),
-            np.concatenate([known, lower]),
-            np.concatenate([known, upper]),
-        )
-        return _unpack(x, stance, status, iterations)
+        return _unpack(x, stance, status)
 
 
 class WarmOsqp:
@@ -171,16 +98,16 @@ class WarmOsqp:
         self._settings = settings
         self._model: osqp.OSQP | None = None
 
-    def solve(self, q: Array, lower: Array, upper: Array) -> tuple[Array, str, int]:
+    def solve(self, q: Array, lower: Array, upper: Array) -> tuple[Array, str]:
         if (lower > upper).any():  # OSQP refuses such data instead of answering
-            return np.full(len(q), np.nan), "primal infeasible", 0
+            return np.full(len(q), np.nan), "primal infeasible"
         if self._model is None:
             self._model = osqp.OSQP()
             self._model.setup(self._P, q, self._A, lower, upper, verbose=False, **self._settings)
         else:
             self._model.update(q=q, l=lower, u=upper)  # unknown names are ignored
         result = self._model.solve(raise_error=False)
-        return result.x, result.info.status, int(result.info.iter)
+        return result.x, result.info.status
 
 
 def _Q(config: PlannerConfig, steps: int) -> Array:
@@ -199,7 +126,7 @@ def _force_rows(config: PlannerConfig, steps: int) -> sparse.sparray:
     return sparse.vstack([sparse.eye_array(3 * feet), sparse.kron(sparse.eye_array(feet), cone)])
 
 
-def force_bounds(config: PlannerConfig, stance: Stance, nominal: Array) -> tuple[Array, Array]:
+def _force_bounds(config: PlannerConfig, stance: Stance, nominal: Array) -> tuple[Array, Array]:
     """Bounds of `_force_rows`: a box and the friction cone in stance, exactly zero in swing."""
     vertical = nominal.reshape(*stance.shape, 3)[..., 2]
     box = np.where(stance[..., None], np.array(config.deviation_max), 0.0)
@@ -212,13 +139,7 @@ def force_bounds(config: PlannerConfig, stance: Stance, nominal: Array) -> tuple
     )
 
 
-def _robots_first(rows: Array, n: int, dim: int) -> Array:
-    """Reorder rows stacked by (time, robot, dim) to (robot, time, dim)."""
-    count = rows.shape[1]
-    return rows.reshape(-1, n, dim, count).transpose(1, 0, 2, 3).reshape(-1, count)
-
-
-def _unpack(x: Array, stance: Stance, status: str, iterations: int) -> Written:
+def _unpack(x: Array, stance: Stance, status: str) -> Written:
     n, N, _ = stance.shape
     u, y, _ = np.split(x, [n * N * N_FORCES, n * N * (N_FORCES + N_OUTPUTS)])
-    return Written(u.reshape(n, N, N_FORCES), y.reshape(n, N, N_OUTPUTS), status, iterations)
+    return Written(u.reshape(n, N, N_FORCES), y.reshape(n, N, N_OUTPUTS), status)

@@ -25,10 +25,11 @@ def headline(parts: dict[str, Part]) -> dict[str, Any]:
     """The figures that other programs read; None where a part was left out."""
     low, walks, recorder = (parts.get(name, {}) for name in ("low-level", "walks", "recorder"))
     rows, cost = walks.get("rows", []), walks.get("recorder")
-    tick = _planner_tick(parts.get("planner", {}).get("rows", []))
+    plans = {row["problem"]: row for row in parts.get("planner", {}).get("rows", ())}
+    tick = plans.get("eq. 12, with the peers' terms", {})
     return {
         "planner_tick_ratio_median": tick.get("ratio_median"),
-        "planner_constrained_ratio_p99": tick.get("constrained_ratio_p99"),
+        "planner_constrained_ratio_p99": tick.get("bound_ratio_p99"),
         "low_level_us_median": low["hot"]["median"] if low else None,
         "low_level_us_cold_median": low["cold"]["median"] if low else None,
         "rtf": {str(row["robots"]): row["rtf"] for row in rows},
@@ -49,12 +50,6 @@ def messaging_share(row: Part) -> float:
     messages and waiting, and may be negative.
     """
     return 1.0 - float(row["alone"]["tick_us"] / row["tick_us"])
-
-
-def _planner_tick(rows: Sequence[Part]) -> Part:
-    """The row of a robot's whole planning step, ours; empty if it was not measured."""
-    ours = (row for row in rows if (row["problem"], row["name"]) == ("eq. 12, tick", "daqp"))
-    return next(ours, {})
 
 
 def section(name: str, part: Part) -> Table:
@@ -92,22 +87,24 @@ def _machine(part: Part) -> list[str]:
 
 
 def _planner(part: Part) -> list[str]:
-    return [
-        f"n = {row['robots']}, {row['problem']}, {row['name']}: {row['median_ms']:.3f} ms, p99 "
-        f"{row['p99_ms']:.3f} (as written × {row['ratio_median']:.0f}){_constrained(row)}"
-        for row in part["rows"]
-        if row["name"] == "daqp"
-    ]
+    lines = []
+    for row in part["rows"]:
+        bound = "no plan at a bound"
+        if row["bound_plans"]:
+            bound = f"{row['bound_plans']:.0f} plans at a bound: {_plan(row, 'bound_')}"
+        lines.append(
+            f"n = {row['robots']}, {row['problem']}: {_plan(row, '')}; {bound}; largest error "
+            f"{row['force_error_n']:.1g} N, as written {row['written_force_error_n']:.1g} N"
+        )
+    return lines
 
 
-def _constrained(row: Part) -> str:
-    """Of the plans that a bound holds, what they took."""
-    if row["constrained_p99_ms"] is None:
-        return "; no plan at a bound"
-    return (
-        f"; {row['constrained']} plans at a bound: {row['constrained_median_ms']:.3f} ms, p99 "
-        f"{row['constrained_p99_ms']:.3f} (as written × {row['constrained_ratio_p99']:.0f})"
+def _plan(row: Part, prefix: str) -> str:
+    """What plans take, and the paper's way as a multiple of it."""
+    median, p99, times, times_p99 = (
+        row[prefix + name] for name in ("median_ms", "p99_ms", "ratio_median", "ratio_p99")
     )
+    return f"{median:.3f} ms, p99 {p99:.3f} (as written × {times:.0f}, × {times_p99:.0f})"
 
 
 def _low_level(part: Part) -> list[str]:
@@ -128,11 +125,6 @@ def _bus(part: Part) -> list[str]:
     ]
 
 
-def _world(part: Part) -> list[str]:
-    rows = (f"n = {r['robots']} {r['terrain']} {r['median']:.0f} µs" for r in part["rows"])
-    return [f"a step: {', '.join(rows)}"]
-
-
 def _recorder(part: Part) -> list[str]:
     return [
         f"{part['per_s']:,.0f} messages/s of {part['asked_per_s']:,.0f} asked for, "
@@ -142,8 +134,10 @@ def _recorder(part: Part) -> list[str]:
 
 def _fit(part: Part) -> list[str]:
     return [
-        f"n = {part['robots']}, T = {part['samples']}: {part['seconds']:.2f} s, "
-        f"peak {part['peak_gb']:.2f} GB"
+        f"n = {row['robots']}, T = {row['samples']}: {row['seconds']:.2f} s, at most "
+        f"{row['most_seconds']:g} s; peak {row['peak_gb']:.2f} GB"
+        f"{'' if row['kept'] else '; a limit is MISSED'}"
+        for row in part["rows"]
     ]
 
 
@@ -198,6 +192,6 @@ def _memory(figures: dict[str, dict[str, float]]) -> str:
 
 LINES: Final[dict[str, Callable[[Part], list[str]]]] = {
     "machine": _machine, "planner": _planner, "low-level": _low_level, "bus": _bus,
-    "world": _world, "recorder": _recorder, "fit": _fit, "start": _start,
+    "recorder": _recorder, "fit": _fit, "start": _start,
     "real-time": _realtime, "walks": _walks,
 }  # fmt: skip

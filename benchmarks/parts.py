@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
-
-from benchmarks.options import Options
 
 if TYPE_CHECKING:
     from quadriga.agents.predictor.predictor import Predictor
@@ -19,18 +18,42 @@ Tell = Callable[[str], None]
 Part = dict[str, Any]
 
 
-def planner(options: Options, console: Console, tell: Tell) -> Part:
-    """Time of a plan, ours and as written; `python -m benchmarks.planner` measures it at length."""
-    from benchmarks.planner import measure, record_walks
-    from benchmarks.planner_contenders import Local, Team
+@dataclass(frozen=True)
+class Options:
+    """Which parts, how large and how long.
 
-    robots, seconds = (1, 1.0) if options.quick else (3, 1.2)
-    config, predictor, walks = record_walks(robots, seconds, console)
+    Attributes:
+        parts: names of the parts, in order.
+        robots: sizes of the teams that walk.
+        seconds: world time of each walk.
+        seed: of the worlds in which plans are made.
+        planner: `planner.kind` of the walks.
+        quick: whether every part is as small as possible.
+        out: the JSON file.
+    """
+
+    parts: tuple[str, ...]
+    robots: tuple[int, ...]
+    seconds: float
+    seed: int
+    planner: str
+    quick: bool
+    out: Path
+
+    @property
+    def middle(self) -> int:
+        """The size of the team in the parts that measure one: 3 unless only others walk."""
+        return min(self.robots, key=lambda n: abs(n - 3))
+
+
+def planner(options: Options, console: Console, tell: Tell) -> Part:
+    """Time of a plan, ours and as written."""
+    from benchmarks.planner import measure, record_walks
+
+    robots, seconds = (1, 1.0) if options.quick else (options.middle, options.seconds)
+    config, predictor, walks = record_walks(robots, seconds, console, options.seed)
     tell("plans")
-    rows = measure(config, Local(config, predictor), walks)
-    if not options.quick:
-        rows += measure(config, Team(config, predictor), [walk[-4:] for walk in walks])
-    return {"rows": rows}
+    return {"rows": measure(config, predictor, walks)}
 
 
 def low_level(options: Options, console: Console, tell: Tell) -> Part:
@@ -56,18 +79,6 @@ def bus(options: Options, _console: Console, tell: Tell) -> Part:
     return {"rows": rows}
 
 
-def world(options: Options, _console: Console, tell: Tell) -> Part:
-    """A tick of the world."""
-    from benchmarks.children import result_of
-    from benchmarks.world_steps import measure
-
-    rows = []
-    for robots, terrain in (*((n, "flat") for n in (1, 3, 5, 10)), (3, "heightfield")):
-        tell(f"n = {robots}, {terrain}")
-        rows.append(result_of(measure, robots, terrain, 50 if options.quick else 2000))
-    return {"rows": rows}
-
-
 def recorder(options: Options, _console: Console, _tell: Tell) -> Part:
     """The recorder's throughput."""
     from benchmarks.recorder import measure
@@ -77,14 +88,18 @@ def recorder(options: Options, _console: Console, _tell: Tell) -> Part:
         return dict(measure(rate, seconds, 2, Path(scratch)))
 
 
-def fit(options: Options, _console: Console, _tell: Tell) -> Part:
-    """The predictor's fit for a small team; `python -m benchmarks.fit` measures large ones."""
+def fit(options: Options, _console: Console, tell: Tell) -> Part:
+    """The predictor's fit, for each size of a team that has a limit."""
     from benchmarks.children import result_of
     from benchmarks.fit import SIZES, measure
 
-    size = SIZES[0]
-    samples = 2100 if options.quick else size.samples
-    return dict(result_of(measure, size.robots, samples, "ridge"))
+    rows = []
+    for size in SIZES[:1] if options.quick else SIZES:
+        tell(f"n = {size.robots}")
+        found = result_of(measure, size.robots, 2100 if options.quick else size.samples)
+        kept = found["seconds"] <= size.seconds and found["peak_gb"] <= size.gigabytes
+        rows.append({**found, "most_seconds": size.seconds, "kept": kept})
+    return {"rows": rows}
 
 
 def start(options: Options, console: Console, tell: Tell) -> Part:
@@ -100,8 +115,6 @@ def start(options: Options, console: Console, tell: Tell) -> Part:
 
 def realtime(options: Options, console: Console, tell: Tell) -> Part:
     """Late commands of two robots in real time, three walks."""
-    from dataclasses import replace
-
     from benchmarks.realtime import measure
     from quadriga.agents.predictor.store import predictor_sha256
     from quadriga.warm_up import warm_up
@@ -143,8 +156,6 @@ def walks(options: Options, console: Console, tell: Tell) -> Part:
 
 def recorder_turns(options: Options, rows: list[Part], console: Console, tell: Tell) -> Part:
     """Real-time factors of walks with and without recorder, in turns after the one in `rows`."""
-    from dataclasses import replace
-
     from benchmarks.walks import over_the_bus
 
     middle = options.middle
@@ -182,6 +193,6 @@ def team(
 
 
 PARTS: dict[str, Callable[[Options, Console, Tell], Part]] = {
-    "planner": planner, "low-level": low_level, "bus": bus, "world": world,
+    "planner": planner, "low-level": low_level, "bus": bus,
     "recorder": recorder, "fit": fit, "start": start, "real-time": realtime, "walks": walks,
 }  # fmt: skip

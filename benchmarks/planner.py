@@ -1,145 +1,93 @@
-"""Time of a plan on a real walk: the paper's problems as written there, against ours.
+"""Time of a plan on real walks: the paper's problems as written there, against ours.
 
-Run: python -m benchmarks.planner [--robots 3 5] [--seconds 4] [--seed 1] [--out FILE]
-
-Every contender solves every planning step of the same walks, one after the other within each step,
-in one process with one BLAS thread. Times are processor times, so other programs do not count. "as
-written" is sparse OSQP with its own tolerances, one object warm-started from step to step. Errors
-are against OSQP at 1e-9 on the condensed problem; the gap is relative to the plan's improvement on
-nominal forces.
+Both solve every planning step of the same walks in turns, in one process with one BLAS thread.
+Times are processor times, so other programs do not count. "As written" is sparse OSQP with its own
+tolerances, one object warm-started from step to step. Errors of the applied forces are against OSQP
+at 1e-9 on the condensed problem.
 """
 
 from __future__ import annotations
 
-from benchmarks import blas_threads  # before numpy
-
-# isort: split
-import argparse
-import json
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from pathlib import Path
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache
 from time import thread_time
-from typing import Any, Protocol
+from typing import Any, Final
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 from scipy import sparse
 
-from benchmarks.as_written import TIGHT, WarmOsqp
-from benchmarks.page import targets
-from benchmarks.planner_contenders import (
-    AS_WRITTEN,
-    Case,
-    Contender,
-    Local,
-    Team,
-    TeamDeepc,
-    is_at_bound,
-)
+from benchmarks.as_written import TIGHT, PaperQp, WarmOsqp
 from benchmarks.planner_ticks import PlanningTick, record
-from quadriga.agents.planner.qp import PlannerProblem
+from quadriga.agents.planner.peers import Peers
+from quadriga.agents.planner.planner import Planner, PlannerState
+from quadriga.agents.planner.qp import PlannerProblem, build_problem, unpack
+from quadriga.agents.planner.solver import DaqpSolver
+from quadriga.agents.planner.team import build_centralised
 from quadriga.agents.predictor.gates import load_checked
 from quadriga.agents.predictor.predictor import Predictor
-from quadriga.identification.predictors import ensure_data, ensure_predictor
+from quadriga.identification.predictors import ensure_predictor
 from quadriga.shared.config.load import load
 from quadriga.shared.config.sections import Config
 from quadriga.shared.robots.conventions import Array
 
-# Limits of the figures at n = 5.
-TARGETS = (
-    ("ratio_median", ">=", 40.0), ("ratio_p99", ">=", 40.0), ("tick_ratio_median", ">=", 40.0),
-    ("tick_ratio_p99", ">=", 40.0), ("constrained_ratio_p99", ">=", 40.0),
-    ("central_ratio_median", ">=", 50.0), ("applied_force_error_n", "<=", 0.01),
-    ("relative_gap", "<=", 1e-6),
-)  # fmt: skip
 # What differs from the default world; a team that is pushed plans at its bounds.
-WALKS: Sequence[Mapping[str, Any]] = (
-    {},
-    {"terrain": "boxes"},
-    {"push_force": 150.0, "push_every": 0.5},
-)
+WALKS: Final[Sequence[Mapping[str, Any]]] = (
+    {}, {"terrain": "boxes"}, {"push_force": 150.0, "push_every": 0.5},
+)  # fmt: skip
 # The paper has one transition matrix for all of the gait, and plans that keep nothing of the last
 # ones nor bring their peers' forward. Such a team need pass no gate of ours to be timed.
-AS_IN_THE_PAPER: Mapping[str, Any] = {
+AS_IN_THE_PAPER: Final[Mapping[str, Any]] = {
     "identification.predictor": "ridge",
     "identification.max_peers_harm": 1000.0,
     "identification.max_radius": 10.0,
     "planner.damping": 0.0,
     "planner.compensation": False,
 }
-SEED = 1
-TEAM_STEPS = 12  # per walk; as written the problem of 5 robots takes most of a second
-DEEPC_STEPS = {1: 20, 3: 2}  # per walk; as written: 0.3 s for one robot, many for three
-HEADINGS = (
-    "n",
-    "problem",
-    "how",
-    "plans",
-    "median ms",
-    "p99 ms",
-    "× median",
-    "× p99",
-    "cone N",
-    "force N",
-    "gap",
-    "at a bound",
-    "median ms",
-    "p99 ms",
-    "× p99",
-)
+PEERS: Final = "eq. 12, with the peers' terms"
+_TEAM_STEPS: Final = 12  # per walk; as written the problem of 5 robots takes most of a second
+_AT_BOUND: Final = 1e-6  # N, of the exact answer
+
+Row = dict[str, Any]
 
 
-Row = dict[str, float | str | None]
+@dataclass(frozen=True)
+class Case:
+    """One plan to make: of one robot (eq. 12) or of the team (eq. 7).
+
+    Attributes:
+        tick: the planning step of the walk.
+        robots: whose plan.
+        problem: the condensed one, by which answers are judged.
+        y_free: outputs without future forces, (6 N · robots,).
+        y_des: desired outputs.
+    """
+
+    tick: PlanningTick
+    robots: slice
+    problem: PlannerProblem
+    y_free: Array
+    y_des: Array
 
 
-class Formulation(Protocol):
-    """One problem with its contenders."""
+@dataclass
+class Contender:
+    """One way of computing a plan.
 
-    def cases(self, tick: PlanningTick) -> list[Case]:
-        """The plans of one step."""
-        ...
+    Attributes:
+        solve: force deviations of a case, N.
+        times: seconds of each plan.
+        errors: of each plan, the largest of the forces that are applied, N.
+    """
 
-    def contenders(self) -> list[Contender]:
-        """Fresh contenders."""
-        ...
-
-
-def main() -> None:
-    """Measure, print and write."""
-    options = arguments()
-    console = Console(width=120)
-    rows: list[Row] = []
-    for robots in options.robots:
-        config, predictor, walks = record_walks(robots, options.seconds, console, options.seed)
-        rows += measure(config, Local(config, predictor), walks)
-        team = [walk[-TEAM_STEPS:] for walk in walks]
-        rows += measure(config, Team(config, predictor), team)
-    for robots in options.deepc:
-        rows += deepc(robots, options, console)
-    figures = headline(rows)
-    console.print(table(rows))
-    console.print(targets(figures, TARGETS))
-    options.out.parent.mkdir(parents=True, exist_ok=True)
-    options.out.write_text(
-        json.dumps({**figures, "blas_threads": blas_threads.THREADS, "rows": rows}, indent=2) + "\n"
-    )
-
-
-def arguments() -> argparse.Namespace:
-    """The command line."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--robots", type=int, nargs="+", default=[3, 5])
-    parser.add_argument("--deepc", type=int, nargs="*", default=[1, 3], help="team sizes for eq. 5")
-    parser.add_argument("--seconds", type=float, default=4.0, help="length of each walk")
-    parser.add_argument("--seed", type=int, default=SEED, help="of the walks' worlds")
-    parser.add_argument("--out", type=Path, default=Path("runs/bench-planner.json"))
-    return parser.parse_args()
+    solve: Callable[[Case], Array]
+    times: list[float] = field(default_factory=list)
+    errors: list[float] = field(default_factory=list)
 
 
 def record_walks(
-    robots: int, seconds: float, console: Console, seed: int = SEED
+    robots: int, seconds: float, console: Console, seed: int
 ) -> tuple[Config, Predictor, list[list[PlanningTick]]]:
     """A team, its predictor, and the planning steps of its walks."""
     world = {"world.duration": seconds, "world.seed": seed}
@@ -149,129 +97,172 @@ def record_walks(
     return config, predictor, [record(replace(config, world=w), predictor) for w in worlds]
 
 
-def deepc(robots: int, options: argparse.Namespace, console: Console) -> list[Row]:
-    """Eq. 5 for a team of this size."""
-    config, _, walks = record_walks(robots, options.seconds, console, options.seed)
-    episodes = ensure_data(config, console).training
-    last = [walk[-DEEPC_STEPS.get(robots, 1) :] for walk in walks]
-    return measure(config, TeamDeepc(config, episodes), last)
-
-
 def measure(
-    config: Config, formulation: Formulation, walks: Sequence[Sequence[PlanningTick]]
+    config: Config, predictor: Predictor, walks: Sequence[Sequence[PlanningTick]]
 ) -> list[Row]:
-    """Run every contender on every case, another one first each time; one row per contender."""
-    contenders = formulation.contenders()
-    cases = [case for walk in walks for tick in walk for case in formulation.cases(tick)]
-    bound: list[bool] = []
-    for case in formulation.cases(walks[0][0]):
-        for contender in contenders:
-            contender.run(case)  # the first call includes the set-up
+    """One row for each problem: times of the paper's way and of ours, and their errors."""
+    local, team = _Local(config, predictor), _Team(config, predictor)
+    own = [case for walk in walks for tick in walk for case in local.cases(tick)]
+    joint = [team.case(tick) for walk in walks for tick in walk[-_TEAM_STEPS:]]
+    return [
+        compare("eq. 12, QP", config, own, Contender(local.as_written), Contender(local.solve)),
+        compare(PEERS, config, own, Contender(local.step_as_written), Contender(local.step)),
+        compare("eq. 7", config, joint, Contender(team.as_written), Contender(team.step)),
+    ]
+
+
+def compare(
+    problem: str, config: Config, cases: Sequence[Case], written: Contender, ours: Contender
+) -> Row:
+    """Run both on every case, in turns the first, and judge them, at bounds of forces too."""
+    for case in cases[: config.team.robots]:
+        written.solve(case), ours.solve(case)  # the first call includes the set-up
+    bound = []
     for turn, case in enumerate(cases):
-        exact = reference(case.problem, case.f)
-        bound.append(is_at_bound(case.problem, exact))
-        for place in range(len(contenders)):
-            contender = contenders[(place + turn) % len(contenders)]
+        exact = _reference(case)
+        bound.append(_is_at_bound(case.problem, exact))
+        for contender in (written, ours) if turn % 2 else (ours, written):
             begun = thread_time()
-            u = contender.run(case)
+            u = contender.solve(case)
             contender.times.append(thread_time() - begun)
-            contender.errors.append(judge(config, case, exact, u))
-    yardstick = {c.problem: c for c in contenders if c.name == AS_WRITTEN}
-    return [row(config.team.robots, c, yardstick[c.problem], bound) for c in contenders]
+            contender.errors.append(_applied_error(config, case, exact, u))
+    row = {"robots": config.team.robots, "problem": problem}
+    row |= {"force_error_n": max(ours.errors), "written_force_error_n": max(written.errors)}
+    return (
+        row
+        | _times("", ours, written, [True] * len(cases))
+        | _times("bound_", ours, written, bound)
+    )
 
 
-def reference(problem: PlannerProblem, f: Array) -> Array:
+def _times(prefix: str, ours: Contender, written: Contender, chosen: Sequence[bool]) -> Row:
+    """Median and p99 of some of the plans, ms, and how many times as long the paper's way takes."""
+    if not any(chosen):
+        return {f"{prefix}plans": 0}
+    (median, p99), (slow, slow_p99) = (
+        1e3 * np.percentile(np.array(each.times)[np.array(chosen)], (50, 99))
+        for each in (ours, written)
+    )
+    figures = {
+        "plans": sum(chosen), "median_ms": median, "p99_ms": p99, "written_median_ms": slow,
+        "written_p99_ms": slow_p99, "ratio_median": slow / median, "ratio_p99": slow_p99 / p99,
+    }  # fmt: skip
+    return {f"{prefix}{name}": float(value) for name, value in figures.items()}
+
+
+def _reference(case: Case) -> Array:
     """The minimiser by OSQP at 1e-9."""
+    problem, f = case.problem, case.problem.gradient @ (case.y_free - case.y_des)
     A = sparse.csc_array(np.vstack([np.eye(len(f)), problem.A]))
-    solver = WarmOsqp(sparse.csc_array(np.triu(problem.H)), A, TIGHT)
-    x, status, _ = solver.solve(f, problem.lower, problem.upper)
+    settings = {**TIGHT, "polishing": 0}  # which prints a line where no bound is active
+    solver = WarmOsqp(sparse.csc_array(np.triu(problem.H)), A, settings)
+    x, status = solver.solve(f, problem.lower, problem.upper)
     if status != "solved":
-        raise RuntimeError(f"the reference did not converge: {status}")
+        raise ChildProcessError(f"the reference did not converge: {status}")
     return x
 
 
-def judge(config: Config, case: Case, exact: Array, u: Array) -> tuple[float, float, float]:
-    """Violation of the cone [N], force error on the applied samples [N], gap of the objective."""
-    robots, problem = list(case.robots), case.problem
-    stance, nominal = case.tick.stance[robots], case.tick.nominal[robots]
+def _is_at_bound(problem: PlannerProblem, x: Array) -> bool:
+    """Whether any bound holds the minimiser."""
+    values = np.concatenate([x, problem.A @ x])
+    return bool(np.minimum(problem.upper - values, values - problem.lower).min() < _AT_BOUND)
+
+
+def _applied_error(config: Config, case: Case, exact: Array, u: Array) -> float:
     best = np.zeros(u.size)
-    best[problem.columns] = exact
-    error = np.abs(u - best).reshape(nominal.shape)[:, : config.planner.applied]
-
-    def objective(v: Array) -> float:
-        return float(0.5 * v @ problem.H @ v + case.f @ v)
-
-    least = objective(exact)
-    gap = abs(objective(u[problem.columns]) - least) / abs(least)
-    force = (nominal + u.reshape(nominal.shape)).reshape(*stance.shape, 3)
-    fx, fy, fz = np.moveaxis(force, -1, 0)
-    c = config.planner.mu / np.sqrt(2.0)
-    beyond = np.maximum.reduce([np.abs(fx) - c * fz, np.abs(fy) - c * fz, -fz])
-    violation = np.where(stance, np.maximum(beyond, 0.0), np.abs(force).max(axis=-1))
-    return float(violation.max()), float(error.max()), gap
+    best[case.problem.columns] = exact
+    error = np.abs(u.ravel() - best).reshape(case.tick.nominal[case.robots].shape)
+    return float(error[:, : config.planner.applied].max())
 
 
-def row(robots: int, contender: Contender, yardstick: Contender, bound: Sequence[bool]) -> Row:
-    """Figures of a contender, of its plans at a bound too; ratios are yardstick over contender."""
-    (median, p99), (slow, slow_p99) = (
-        1e3 * np.percentile(c.times, (50, 99)) for c in (contender, yardstick)
-    )
-    cone, force, gap = np.max(contender.errors, axis=0)
-    held: list[float | None] = [None, None, None]
-    if any(bound):
-        (own, own_p99), (_, other_p99) = (
-            1e3 * np.percentile(np.array(c.times)[bound], (50, 99)) for c in (contender, yardstick)
-        )
-        held = [float(own), float(own_p99), float(other_p99 / own_p99)]
-    values = (robots, contender.problem, contender.name, len(contender.times), float(median),
-              float(p99), float(slow / median), float(slow_p99 / p99),
-              float(cone), float(force), float(gap), sum(bound), *held)  # fmt: skip
-    keys = (
-        "robots",
-        "problem",
-        "name",
-        "plans",
-        "median_ms",
-        "p99_ms",
-        "ratio_median",
-        "ratio_p99",
-        "cone_violation_n",
-        "applied_force_error_n",
-        "relative_gap",
-        "constrained",
-        "constrained_median_ms",
-        "constrained_p99_ms",
-        "constrained_ratio_p99",
-    )
-    return dict(zip(keys, values, strict=True))
+class _Local:
+    """Eq. 12: the QP of one robot, and its whole planning step with the peers' terms."""
+
+    def __init__(self, config: Config, predictor: Predictor) -> None:
+        robots, past = range(config.team.robots), predictor.layout.past
+        self._config, self._predictor = config, predictor
+        self._G_u = [np.ascontiguousarray(predictor.block(i, i)[:, past:]) for i in robots]
+        self._G_past = [np.ascontiguousarray(predictor.block(i, i)[:, :past]) for i in robots]
+        self._planners = [Planner(config, i, predictor) for i in robots]
+        self._peers = [Peers(config, i, predictor) for i in robots]
+        self._paper = [PaperQp(config.planner, G_u) for G_u in self._G_u]
+        self._problem, self._solver = cache(self._build), cache(self._build_solver)
+
+    def cases(self, tick: PlanningTick) -> list[Case]:
+        """The plans of one step; also makes the set-up that all ticks share."""
+        made = []
+        for i, stance in enumerate(tick.stance):
+            problem, _ = self._problem(i, stance.tobytes()), self._solver(i, stance.tobytes())
+            made.append(Case(tick, slice(i, i + 1), problem, self._free(tick, i), tick.y_des[i]))
+        return made
+
+    def as_written(self, case: Case) -> Array:
+        tick, own = case.tick, case.robots
+        paper: PaperQp = self._paper[own.start]
+        return paper.solve(case.y_free, case.y_des, tick.stance[own], tick.nominal[own]).u
+
+    def step_as_written(self, case: Case) -> Array:
+        return self.as_written(replace(case, y_free=self._free(case.tick, case.robots.start)))
+
+    def solve(self, case: Case) -> Array:
+        i, problem = case.robots.start, case.problem
+        solver = self._solver(i, case.tick.stance[i].tobytes())
+        solution = solver.solve(problem.condensed.F_des @ (case.y_des - case.y_free))
+        du: Array = unpack(problem, solution.x, case.y_free)[0]
+        return du
+
+    def step(self, case: Case) -> Array:
+        i, tick = case.robots.start, case.tick
+        inputs, peers = tick.inputs[i], tuple(peer for peer in tick.peers if peer.index != i)
+        terms = self._peers[i].terms(peers, inputs.step, inputs.step - 1, tick.base_before)
+        du: Array = self._planners[i].step(PlannerState(), inputs, terms)[1].du
+        return du
+
+    def _free(self, tick: PlanningTick, i: int) -> Array:
+        """Eq. 11 without the robot's own future forces."""
+        y: Array = self._G_past[i] @ tick.past[i]
+        for j, before in enumerate(tick.before):
+            if j != i:
+                y = y + self._predictor.block(i, j) @ before
+        return y
+
+    def _build(self, i: int, stance: bytes) -> PlannerProblem:
+        pattern = np.frombuffer(stance, dtype=np.bool_).reshape(-1, 4)
+        return build_problem(self._config.planner, self._config.robot.weight, self._G_u[i], pattern)
+
+    def _build_solver(self, i: int, stance: bytes) -> DaqpSolver:
+        return DaqpSolver(self._problem(i, stance))
 
 
-def headline(rows: Sequence[Row]) -> dict[str, float | None]:
-    """The figures that have a limit, of the default solver at n = 5."""
-    by_problem = {r["problem"]: r for r in rows if r["robots"] == 5 and r["name"] == "daqp"}
-    wanted = {
-        "ratio_median": ("eq. 12, QP", "ratio_median"), "ratio_p99": ("eq. 12, QP", "ratio_p99"),
-        "tick_ratio_median": ("eq. 12, tick", "ratio_median"),
-        "tick_ratio_p99": ("eq. 12, tick", "ratio_p99"),
-        "constrained_ratio_p99": ("eq. 12, tick", "constrained_ratio_p99"),
-        "central_ratio_median": ("eq. 7", "ratio_median"),
-        "applied_force_error_n": ("eq. 12, QP", "applied_force_error_n"),
-        "relative_gap": ("eq. 12, QP", "relative_gap"),
-    }  # fmt: skip
-    found = {key: by_problem.get(row, {}).get(figure) for key, (row, figure) in wanted.items()}
-    return {key: None if value is None else float(value) for key, value in found.items()}
+class _Team:
+    """Eq. 7: one QP for all robots, timed with all that depends on the tick."""
 
+    def __init__(self, config: Config, predictor: Predictor) -> None:
+        robots, past = range(config.team.robots), predictor.layout.past
+        G = np.block([[predictor.block(i, j) for j in robots] for i in robots])
+        own = np.tile(np.arange(G.shape[1] // len(robots)) < past, len(robots))
+        self._G_past, self._G_u = (np.ascontiguousarray(G[:, part]) for part in (own, ~own))
+        self._config, self._planner = config, build_centralised(config, predictor)
+        self._paper = PaperQp(config.planner, self._G_u)
+        self._problem = cache(self._build)
 
-def table(rows: Sequence[Row]) -> Table:
-    """All rows, for people."""
-    shown = Table(*HEADINGS)
-    for values in rows:
-        cells = [
-            "–" if v is None else v if isinstance(v, str) else f"{v:.3g}" for v in values.values()
-        ]
-        shown.add_row(*cells)
-    return shown
+    def case(self, tick: PlanningTick) -> Case:
+        """The plan of one step."""
+        problem = self._problem(tick.stance.tobytes())
+        return Case(tick, slice(None), problem, self._free(tick), tick.y_des.ravel())
 
+    def as_written(self, case: Case) -> Array:
+        y_free, tick = self._free(case.tick), case.tick
+        return self._paper.solve(y_free, case.y_des, tick.stance, tick.nominal).u
 
-if __name__ == "__main__":
-    main()
+    def step(self, case: Case) -> Array:
+        du: Array = self._planner.step(case.tick.inputs).u - case.tick.nominal
+        return du
+
+    def _free(self, tick: PlanningTick) -> Array:
+        y: Array = self._G_past @ tick.past.ravel()
+        return y
+
+    def _build(self, stance: bytes) -> PlannerProblem:
+        pattern = np.frombuffer(stance, dtype=np.bool_).reshape(-1, 4)
+        return build_problem(self._config.planner, self._config.robot.weight, self._G_u, pattern)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-import sys
 from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -30,7 +29,9 @@ from quadriga.shared.members import SIM
 from quadriga.shared.messages import Reference
 from quadriga.shared.recording.reader import Recording
 from quadriga.shared.runtime.clock import monotonic, sleep
+from quadriga.shared.runtime.process_use import read_use
 from quadriga.team.endpoint import free_endpoint
+from quadriga.team.launch import QUADRIGA
 
 KEYS = 10  # of each publisher
 PROBE = "probe"  # sent until the recorder has heard every publisher
@@ -62,9 +63,14 @@ def publish(
 
 
 def processor_time(pid: int) -> float:
-    """Seconds of processor time that a process has taken so far, user and system."""
-    fields = Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(") ")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    """Seconds of processor time that a process has taken so far.
+
+    Raises:
+        ChildProcessError: it has ended.
+    """
+    if (use := read_use(pid)) is None:
+        raise ChildProcessError("the recorder ended before its time")
+    return use.cpu_s
 
 
 def measure(rate: float, seconds: float, publishers: int, folder: Path) -> dict[str, float]:
@@ -97,23 +103,9 @@ def measure(rate: float, seconds: float, publishers: int, folder: Path) -> dict[
 @contextmanager
 def recording(file: Path, config: Path) -> Iterator[int]:
     """Run a recorder and yield its process id; at the end of the block it closes the file."""
-    recorder = subprocess.Popen(
-        [
-            sys.executable,
-            "-m",
-            "quadriga",
-            "record",
-            "--now",
-            "-o",
-            str(file),
-            "--config",
-            str(config),
-            "--parent",
-            str(os.getpid()),
-        ],
-        stdout=subprocess.DEVNULL,
-        start_new_session=True,
-    )
+    words = ["record", "--now", "-o", str(file), "--config", str(config)]
+    command = [*QUADRIGA, *words, "--parent", str(os.getpid())]
+    recorder = subprocess.Popen(command, stdout=subprocess.DEVNULL, start_new_session=True)
     try:
         yield recorder.pid
     finally:

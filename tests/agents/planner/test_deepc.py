@@ -8,12 +8,10 @@ from typing import Any
 
 import daqp
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from benchmarks.as_written import TIGHT, DeepcQp
 from quadriga.agents.gait import horizon_stance
 from quadriga.agents.planner.qp import Condensed, PlannerProblem, constrain
 from quadriga.agents.planner.team import build_model, select
@@ -22,7 +20,7 @@ from quadriga.agents.predictor.hankel import hankel
 from quadriga.agents.predictor.regression import Reduction, reduce
 from quadriga.shared.config.sections import Config, PlannerConfig
 from quadriga.shared.robots.conventions import Array
-from tests.a1 import WEIGHT, nominal_forces
+from tests.a1 import WEIGHT
 
 Team = Callable[..., Any]
 T_INI, N = 2, 3
@@ -224,21 +222,6 @@ def test_with_active_bounds_it_is_equation_5(
     np.testing.assert_allclose(x[case.columns], v, atol=1e-6 * (1.0 + np.abs(v).max()))
     error = (outputs(condensed, case, v) - x[12 * N : 18 * N]).reshape(-1, 6) / Y_SCALE
     np.testing.assert_allclose(error, 0.0, atol=1e-6)
-
-
-@pytest.mark.parametrize(("n", "seed", "noise"), [(1, 1, 0.3), (1, 2, 0.0), (2, 3, 0.05)])
-def test_osqp_finds_the_same_when_it_is_tight(
-    linear_team: Team, n: int, seed: int, noise: float
-) -> None:
-    case = case_of(linear_team, n, seed, noise)
-    condensed, _, planner, v = bounded(case, 1e3, 0.4)
-    written = DeepcQp(planner, case.episodes, 1e3, 1e3, TIGHT).solve(
-        case.past, case.y_des, case.stance, nominal_forces(case.stance)
-    )
-    assert written.status == "solved"
-    np.testing.assert_allclose(written.u.ravel()[case.columns], v, atol=1e-3 * np.abs(v).max())
-    error = (written.y - outputs(condensed, case, v).reshape(written.y.shape)) / Y_SCALE
-    np.testing.assert_allclose(error, 0.0, atol=1e-4)
 
 
 def test_without_noise_it_predicts_the_true_response(linear_team: Team) -> None:
