@@ -18,7 +18,7 @@ ROOTS: Final = (*WALLS, "quadriga", "benchmarks")
 # Lines of each package, of Python and of pages, docstrings and blanks included. Lowering one is
 # always right; raising one needs a reason beside it.
 BUDGETS: Final[Mapping[str, int]] = {
-    "agents": 9_555,  # planned: 8,000; left: cooperation, periodic fits; came: plain ticks
+    "agents": 9_550,  # planned: 8,000; left: cooperation, periodic fits; came: plain ticks
     "plant": 1_142,  # planned: 1,000
     "sim_server": 2_656,  # planned: 2,600
     "bridges": 1_904,
