@@ -25,7 +25,7 @@ BUDGETS: Final[Mapping[str, int]] = {
     "shared": 8_832,  # planned: 7,200; left: Unitree's protocols, the barrier; came: the plant link
     "quadriga": 39_638,  # planned: 18,200; left: harnesses of experiments, report, commands
     "benchmarks": 4_265,  # planned: 1,800
-    "tests": 45_465,  # planned: 28,000
+    "tests": 45_597,  # planned: 28,000; came: what a stranger packs, the release
 }
 COUNTED: Final = (".py", ".js", ".css", ".html")
 MOST_ARGUMENTS: Final = 8
