@@ -9,7 +9,7 @@ MANUAL := $(VENV)/.manual
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 ARGS ?=
 
-.PHONY: install tools walk prepared test nightly test-containers image-lock lint endurance format docs dist pages manual links gallery figures clip acceptance bench bench-against
+.PHONY: install tools walk prepared test nightly test-containers image-lock sbom lint endurance format docs dist pages manual links gallery figures clip acceptance bench bench-against
 
 install: $(STAMP)
 
@@ -70,6 +70,12 @@ image-lock: $(TOOLS)
 	echo 'setuptools>=77' | $(BIN)/uv pip compile --quiet pyproject.toml - -c requirements.lock \
 		--generate-hashes --no-annotate --custom-compile-command 'make image-lock' \
 		--python-version 3.11 --python-platform linux --only-binary :all: -o deploy/image.lock
+
+# What an image is made of, as a software bill of materials (CycloneDX), in dist/.
+sbom: $(TOOLS)
+	mkdir -p dist
+	$(BIN)/python -W ignore -m cyclonedx_py requirements deploy/image.lock --pyproject pyproject.toml \
+		--output-reproducible -o dist/quadriga.cdx.json
 
 # Half an hour of two robots in real time: does memory grow, is anything lost?
 endurance: $(STAMP)

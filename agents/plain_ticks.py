@@ -75,10 +75,8 @@ class PlainTicks:
         )
         self._state: AgentState | None = None  # after the last step
         self._next = self._last = self._due = self._change = _NEVER
-        self._limited, self._at_limit = (
-            0,
-            False,
-        )  # plain ticks at which a limit was active; the last
+        self._limited = 0  # plain ticks at which a limit of the QP was active
+        self._at_limit = False  # whether one was at the last
         self._tau = np.zeros(N_JOINTS)
         state, gait = np.zeros(len(most)), agent.gait.at(0, agent.initial().mode)
         self._run(state, gait)  # compiled, or loaded, now

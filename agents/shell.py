@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from contextlib import closing
+from os import sched_yield
 from typing import Any, Final, Protocol
 
 import numpy as np
@@ -28,7 +29,7 @@ from quadriga.shared.link.ticks import TickBatch
 from quadriga.shared.messages import Command, Message, State
 from quadriga.shared.robots.conventions import Array
 from quadriga.shared.runtime.clock import log_ns, monotonic, monotonic_ns
-from quadriga.shared.runtime.scheduling import at_work, give_way
+from quadriga.shared.runtime.scheduling import at_work
 from quadriga.shared.runtime.signals import interruptible
 from quadriga.shared.topics import (
     AGENT_EVENT,
@@ -170,13 +171,8 @@ class AgentShell:
 
     def _answer_plainly(self) -> bool:
         """Answer the state that has just come by a plain tick, if it is one."""
-        plain, inbox, received, begun = (
-            self._plain,
-            self._inbox,
-            self._link.received,
-            monotonic_ns(),
-        )
-        tick = received.tick
+        plain, inbox, received = self._plain, self._inbox, self._link.received
+        tick, begun = received.tick, monotonic_ns()
         if plain is None or not plain.answers(tick) or inbox.has_state:
             return False
         self._take_mail()
@@ -192,7 +188,7 @@ class AgentShell:
         self._send(tick, received.state)
         inbox.pass_state(tick)
         if due:
-            give_way()  # another robot's answer is due before this one's plan
+            sched_yield()  # another robot's answer is due before this one's plan
             state = State.from_row(tick, 1_000_000 * tick, received.state.copy())
             self._memory = self._step(self._memory_now(), state, plain.acted, begun)
         else:

@@ -18,14 +18,14 @@ ROOTS: Final = (*WALLS, "quadriga", "benchmarks")
 # Lines of each package, of Python and of pages, docstrings and blanks included. Lowering one is
 # always right; raising one needs a reason beside it.
 BUDGETS: Final[Mapping[str, int]] = {
-    "agents": 9_555,  # planned: 8,000; left: cooperation, periodic fits; came: plain ticks
+    "agents": 9_550,  # planned: 8,000; left: cooperation, periodic fits; came: plain ticks
     "plant": 1_142,  # planned: 1,000
     "sim_server": 2_656,  # planned: 2,600
     "bridges": 1_904,
     "shared": 8_832,  # planned: 7,200; left: Unitree's protocols, the barrier; came: the plant link
     "quadriga": 39_638,  # planned: 18,200; left: harnesses of experiments, report, commands
     "benchmarks": 4_265,  # planned: 1,800
-    "tests": 45_465,  # planned: 28,000
+    "tests": 45_597,  # planned: 28,000; came: what a stranger packs, the release
 }
 COUNTED: Final = (".py", ".js", ".css", ".html")
 MOST_ARGUMENTS: Final = 8

@@ -27,14 +27,14 @@ LEASE_MS: Final = 10_000  # of silence after which a link is given up: its proce
 _RETRY: Final = {"period_init_ms": 20, "period_max_ms": 200, "period_increase_factor": 1.5}
 _COMMON: Final = {
     "transport/link/tx/lease": LEASE_MS,
-    # Nobody is found by multicast, nothing goes through shared memory.
+    # Nobody is found by multicast, nothing goes through shared memory, and nothing is packed: it
+    # could unpack to far more (zenoh issue 2589).
     "scouting/multicast/enabled": False,
     "transport/shared_memory/enabled": False,
+    "transport/unicast/compression/enabled": False,
     # Batches that may wait for a link in real time before messages are dropped; with Zenoh's 2 a
-    # recorder on a busy machine loses one in a thousand. A batch takes up to 64 kB, unless it is
-    # sent at once (`express`): then it is one message, and 16 of them wait where the thread that
-    # sends has not run for 10 ms. Words of people and events have a queue of their own, which is
-    # empty nearly always.
+    # recorder on a busy machine loses one in a thousand. A batch takes up to 64 kB. What is urgent
+    # is sent at once (`express`), and has a queue of its own, which is empty nearly always.
     "transport/link/tx/queue/size/data": 16,
     "transport/link/tx/queue/size/real_time": 16,
     # Linux counts far more bytes of small messages than they have. Its own buffer is full after

@@ -134,8 +134,3 @@ def collector_off() -> Iterator[None]:
         yield
     finally:
         gc.enable()
-
-
-def give_way() -> None:
-    """Let those go first that wait for this core with the same precedence."""
-    os.sched_yield()
