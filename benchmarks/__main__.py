@@ -1,4 +1,4 @@
-"""The benchmark on one page: what plans, ticks, messages, fits, starts and walks cost.
+"""The benchmark on one page: what plans, ticks, messages, fits and walks cost.
 
 Run: python -m benchmarks [PART ...] [--robots 1 2 3 5 10] [--seconds 4] [--out FILE]
 

@@ -87,6 +87,9 @@ def endure(config: Config, out: Path | None, console: Console) -> int:
     console.print(f"fell: {fallen}; lost messages: {lost}; end: {summary['end']}", markup=False)
     parts = (f"{key} {count}" for key, count in summary["gaps_per_topic"].items() if count)
     console.print(f"lost by topic: {', '.join(parts) or 'none'}", markup=False)
+    rows = summary["realtime"].items()
+    late = (f"{name} {_percent(row['late_share'])}" for name, row in rows if name != "world")
+    console.print(f"commands that came late, %: {', '.join(late)}", markup=False)
     passed = (f"{name} {c.get(_PASSED, 0)}" for name, c in summary["counters"].items())
     console.print(f"ticks passed over by late agents: {', '.join(passed)}", markup=False)
     console.print(f"walked {summary['distance']:.0f} m; folder: {folder}", markup=False)
@@ -124,6 +127,10 @@ def grown(samples: list[tuple[float, float]]) -> float:
     width = max(1, round(_SETTLED * len(values)))
     early, late = sorted(values[width : 2 * width] or values[:1]), sorted(values[-width:])
     return late[len(late) // 2] / early[len(early) // 2] - 1.0
+
+
+def _percent(share: float | None) -> str:
+    return "–" if share is None else f"{100.0 * share:.1f}"
 
 
 def _table(samples: Samples, growth: Mapping[str, float]) -> Table:

@@ -16,7 +16,6 @@ TARGETS: Final[Targets] = (
     ("low_level_us_median", "<=", 150.0), ("rtf.3", ">=", 1.5), ("rtf.5", ">=", 0.8),
     ("rtf.10", ">=", 0.5), ("messaging_share.3", "<=", 0.55),
     ("recorder_msgs_per_s", ">=", 19_900.0), ("recorder_gaps", "<=", 0.0),
-    ("start_s", "<=", 4.0), ("realtime_late_share", "<=", 0.03),
 )  # fmt: skip
 _WIDTH: Final = 11
 
@@ -37,8 +36,6 @@ def headline(parts: dict[str, Part]) -> dict[str, Any]:
         "recorder_msgs_per_s": recorder.get("per_s"),
         "recorder_gaps": recorder.get("gaps"),
         "recorder_core_share": recorder.get("core"),
-        "start_s": parts["start"]["median"] if "start" in parts else None,
-        "realtime_late_share": parts.get("real-time", {}).get("late_share"),
         "recorder_cost": 1.0 - fmean(cost["with"]) / fmean(cost["without"]) if cost else None,
     }
 
@@ -141,23 +138,6 @@ def _fit(part: Part) -> list[str]:
     ]
 
 
-def _start(part: Part) -> list[str]:
-    least, most = min(part["seconds"]), max(part["seconds"])
-    return [
-        f"n = {part['robots']}, from the command to the first tick: {part['median']:.1f} s, "
-        f"{least:.1f} to {most:.1f} (× {part['ratio']:.1f} of what one agent imports alone)"
-    ]
-
-
-def _realtime(part: Part) -> list[str]:
-    return [
-        f"n = {part['robots']}, seed {row['seed']}: {100 * row['late_share']:.1f} % of commands "
-        f"late, the oldest {row['oldest_ms']:.0f} ms, {row['rtf']:.2f} × real time, "
-        f"{row['gaps']} messages not recorded; fell: {', '.join(row['fallen']) or 'nobody'}"
-        for row in part["rows"]
-    ]
-
-
 def _walks(part: Part) -> list[str]:
     lines = []
     for row in part["rows"]:
@@ -192,6 +172,5 @@ def _memory(figures: dict[str, dict[str, float]]) -> str:
 
 LINES: Final[dict[str, Callable[[Part], list[str]]]] = {
     "machine": _machine, "planner": _planner, "low-level": _low_level, "bus": _bus,
-    "recorder": _recorder, "fit": _fit, "start": _start,
-    "real-time": _realtime, "walks": _walks,
+    "recorder": _recorder, "fit": _fit, "walks": _walks,
 }  # fmt: skip

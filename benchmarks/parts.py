@@ -102,36 +102,6 @@ def fit(options: Options, _console: Console, tell: Tell) -> Part:
     return {"rows": rows}
 
 
-def start(options: Options, console: Console, tell: Tell) -> Part:
-    """From the command of a walk to its first tick."""
-    from benchmarks.start import measure
-    from quadriga.warm_up import warm_up
-
-    config, _, _ = team(options, options.middle, 0.5, console)
-    warm_up(config, console)
-    tell(f"n = {config.team.robots}")
-    return measure(config, 1 if options.quick else 7)
-
-
-def realtime(options: Options, console: Console, tell: Tell) -> Part:
-    """Late commands of two robots in real time, three walks."""
-    from benchmarks.realtime import measure
-    from quadriga.agents.predictor.store import predictor_sha256
-    from quadriga.warm_up import warm_up
-
-    seconds, seeds = (1.5, (0,)) if options.quick else (10.0, (0, 1, 2))
-    config, path, predictor = team(options, 2, seconds, console)
-    warm_up(config, console)
-    # A computer that is too slow is not refused here: its figure is what was asked for.
-    config = replace(
-        config,
-        world=replace(config.world, mode="realtime"),
-        runtime=replace(config.runtime, check_cpu=False),
-    )
-    sha256 = "" if predictor is None else predictor_sha256(predictor)
-    return measure(config, path, sha256, seeds, tell)
-
-
 def walks(options: Options, console: Console, tell: Tell) -> Part:
     """Real walks of every team size, and of one size with and without recorder in turns."""
     from benchmarks.children import result_of
@@ -194,5 +164,5 @@ def team(
 
 PARTS: dict[str, Callable[[Options, Console, Tell], Part]] = {
     "planner": planner, "low-level": low_level, "bus": bus,
-    "recorder": recorder, "fit": fit, "start": start, "real-time": realtime, "walks": walks,
+    "recorder": recorder, "fit": fit, "walks": walks,
 }  # fmt: skip

@@ -50,15 +50,6 @@ def test_parts_print_their_lines_and_write_their_figures(tmp_path: Path) -> None
 
 
 @pytest.mark.nightly
-def test_a_start_is_measured(tmp_path: Path) -> None:
-    page, found = run(tmp_path / "b.json", "start", "--planner", "none", "--robots", "1")
-    part = found["parts"]["start"]
-    assert [found["start_s"]] == part["seconds"]
-    assert min(*part["seconds"], *part["imports"]) > 0.0
-    assert "from the command to the first tick" in page
-
-
-@pytest.mark.nightly
 def test_walks_are_measured_with_and_without_the_bus(tmp_path: Path) -> None:
     words = ("walks", "--planner", "none", "--robots", "1", "--seconds", "1")
     page, found = run(tmp_path / "b.json", *words)

@@ -33,7 +33,7 @@ from quadriga.team.endpoint import free_endpoint
 from quadriga.team.launch import QUADRIGA, Launch, ProcessSpec, process_table
 from quadriga.warm_up import warm_up
 from tests.listening import WAIT, await_true
-from tests.runtime.slow_motion import in_slow_motion
+from tests.runtime.slow_motion import SlowTime
 
 BEGUN = "0 ms: start "  # in the log of a plant that drives time: all are there, and walk
 # Less than a team collects by default, which takes minutes; for all tests the same, so that they
@@ -42,6 +42,13 @@ DATA = {"identification.seconds": 60.0}
 REAL_TIME = "realtime"
 SPEED = 0.35  # of teams in real time: a slow computer keeps up with two robots
 FOREVER = 600.0  # s of world time
+
+
+def in_slow_motion(row: ProcessSpec, speed: float) -> ProcessSpec:
+    """The same process of the launcher's table by slow clocks; `speed` is a share, at most 1."""
+    module = row.command.index("-m") + 1  # without -P: this module lies in the working directory
+    words = (row.command[0], "-m", SlowTime.__module__, str(speed), *row.command[module:])
+    return replace(row, command=words)
 
 
 @dataclass(frozen=True)

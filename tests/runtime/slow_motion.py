@@ -10,15 +10,8 @@ from __future__ import annotations
 import runpy
 import sys
 import time
-from dataclasses import replace
-from typing import TYPE_CHECKING, Final
 
 from quadriga.shared.runtime import clock
-
-if TYPE_CHECKING:
-    from quadriga.team.launch import ProcessSpec  # a process that runs so need not load it
-
-_NS: Final = 1_000_000_000
 
 
 class SlowTime:
@@ -31,7 +24,7 @@ class SlowTime:
         return round(self._speed * time.monotonic_ns())
 
     def monotonic(self) -> float:
-        return self.monotonic_ns() / _NS
+        return 1e-9 * self.monotonic_ns()
 
     def time_ns(self) -> int:
         return time.time_ns() - time.monotonic_ns() + self.monotonic_ns()
@@ -41,13 +34,6 @@ class SlowTime:
 
     def sleep(self, seconds: float) -> None:
         time.sleep(seconds / self._speed)
-
-
-def in_slow_motion(row: ProcessSpec, speed: float) -> ProcessSpec:
-    """The same process of the launcher's table by slow clocks; `speed` is a share, at most 1."""
-    module = row.command.index("-m") + 1  # without -P: this module lies in the working directory
-    words = (row.command[0], "-m", __name__, str(speed), *row.command[module:])
-    return replace(row, command=words)
 
 
 if __name__ == "__main__":

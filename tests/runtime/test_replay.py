@@ -33,8 +33,7 @@ from quadriga.team.launch import QUADRIGA, Launch, process_table
 from quadriga.what_if.what_if import Branch, WhatIf, answer_what_if
 from tests.listening import WAIT
 from tests.quadriga.replay.rewritten import planted_bit, rewritten, without
-from tests.runtime.conftest import DATA, REAL_TIME, SPEED
-from tests.runtime.slow_motion import in_slow_motion
+from tests.runtime.conftest import DATA, REAL_TIME, SPEED, in_slow_motion
 
 pytestmark = pytest.mark.usefixtures("_compiled")
 

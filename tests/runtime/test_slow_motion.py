@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from quadriga.team.launch import ProcessSpec
-from tests.runtime.slow_motion import in_slow_motion
+from tests.runtime.conftest import in_slow_motion
 
 
 def test_a_process_of_the_table_runs_by_them(tmp_path: Path) -> None:
