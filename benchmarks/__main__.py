@@ -2,10 +2,10 @@
 
 Run: python -m benchmarks [PART ...] [--robots 1 2 3 5 10] [--seconds 4] [--out FILE]
 
-Prints a page and writes FILE (JSON). Each part is measured with real processes
-and real walks on this machine. Other programs change the figures, so run none. For a team that has
-not walked here before, data are collected and a predictor is fitted first, which takes minutes for
-ten robots; `--planner none` walks without a predictor. `--quick` only shows that all parts work.
+Prints a page and writes FILE (JSON). Each part is measured with real processes and real walks on
+this machine. Other programs change the figures, so run none. For a team that has not walked here
+before, data are collected and a predictor is fitted first, which takes minutes for ten robots;
+`--planner none` walks without a predictor. `--quick` only shows that all parts work.
 """
 
 from __future__ import annotations

@@ -15,7 +15,6 @@ from typing import Final
 
 from rich.console import Console
 
-from benchmarks.walks import resident_mb
 from quadriga.identification.predictors import ensure_predictor
 from quadriga.recordings.summary import summarise
 from quadriga.shared.config.load import load
@@ -24,6 +23,7 @@ from quadriga.shared.config.write import to_toml
 from quadriga.shared.errors import QuadrigaError
 from quadriga.shared.planner_kinds import find_kind
 from quadriga.shared.runtime.clock import monotonic
+from quadriga.shared.runtime.process_use import read_use
 from quadriga.shared.runtime.signals import interrupt_on_sigterm
 from quadriga.tables import Table, print_tables
 from quadriga.team.endpoint import free_endpoint
@@ -109,8 +109,8 @@ def _walk(config: Config, folder: Path, predictor: Path | None, console: Console
             if now >= next_look:
                 next_look += _EVERY_S
                 for name, pid in launch.pids.items():
-                    if (found := resident_mb(pid)) is not None:
-                        samples.setdefault(name, []).append((now - begun, found))
+                    if (use := read_use(pid)) is not None:
+                        samples.setdefault(name, []).append((now - begun, 1e-6 * use.memory))
                 console.print(f"{now - begun:.0f}/{total:g} s", end="\r", markup=False)
             return False
 

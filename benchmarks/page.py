@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from statistics import fmean
 from typing import Any, Final
 
 from rich.table import Table
 
 Part = dict[str, Any]
 # Key, sign, limit; a dot leads to the size of the team.
-Targets = Sequence[tuple[str, str, float]]
-TARGETS: Final[Targets] = (
+TARGETS: Final[Sequence[tuple[str, str, float]]] = (
     ("planner_tick_ratio_median", ">=", 40.0), ("planner_constrained_ratio_p99", ">=", 40.0),
     ("low_level_us_median", "<=", 150.0), ("rtf.3", ">=", 1.5), ("rtf.5", ">=", 0.8),
     ("rtf.10", ">=", 0.5), ("messaging_share.3", "<=", 0.55),
@@ -23,12 +21,12 @@ _WIDTH: Final = 11
 def headline(parts: dict[str, Part]) -> dict[str, Any]:
     """The figures that other programs read; None where a part was left out."""
     low, walks, recorder = (parts.get(name, {}) for name in ("low-level", "walks", "recorder"))
-    rows, cost = walks.get("rows", []), walks.get("recorder")
-    plans = {row["problem"]: row for row in parts.get("planner", {}).get("rows", ())}
-    tick = plans.get("eq. 12, with the peers' terms", {})
+    rows = walks.get("rows", [])
+    plans = {row["problem"]: row for row in parts.get("planner", {}).get("rows", [])}
+    step = plans.get("eq. 12, with the peers' terms", {})
     return {
-        "planner_tick_ratio_median": tick.get("ratio_median"),
-        "planner_constrained_ratio_p99": tick.get("bound_ratio_p99"),
+        "planner_tick_ratio_median": step.get("ratio_median"),
+        "planner_constrained_ratio_p99": step.get("bound_ratio_p99"),
         "low_level_us_median": low["hot"]["median"] if low else None,
         "low_level_us_cold_median": low["cold"]["median"] if low else None,
         "rtf": {str(row["robots"]): row["rtf"] for row in rows},
@@ -36,7 +34,6 @@ def headline(parts: dict[str, Part]) -> dict[str, Any]:
         "recorder_msgs_per_s": recorder.get("per_s"),
         "recorder_gaps": recorder.get("gaps"),
         "recorder_core_share": recorder.get("core"),
-        "recorder_cost": 1.0 - fmean(cost["with"]) / fmean(cost["without"]) if cost else None,
     }
 
 
@@ -59,10 +56,10 @@ def section(name: str, part: Part) -> Table:
     return shown
 
 
-def targets(figures: dict[str, Any], held: Targets = TARGETS) -> Table:
+def targets(figures: dict[str, Any]) -> Table:
     """The figures that have a limit; one without a value was not measured, and is not met."""
     shown = Table.grid(padding=(0, 1))
-    for key, sign, limit in held:
+    for key, sign, limit in TARGETS:
         name, _, size = key.partition(".")
         value = figures[name].get(size) if size else figures.get(name)
         held_to = f"held to {sign} {limit:,g}:"
@@ -150,11 +147,6 @@ def _walks(part: Part) -> list[str]:
             f"{100 * messaging_share(row):.0f} %{early}"
         )
         lines.append("  " + _memory(row["memory_mb"]))
-    if cost := part["recorder"]:
-        lines.append(
-            f"n = {cost['robots']}: {fmean(cost['with']):.2f} × real time with recorder, "
-            f"{fmean(cost['without']):.2f} without"
-        )
     return lines
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -103,7 +103,7 @@ def fit(options: Options, _console: Console, tell: Tell) -> Part:
 
 
 def walks(options: Options, console: Console, tell: Tell) -> Part:
-    """Real walks of every team size, and of one size with and without recorder in turns."""
+    """Real walks of every team size."""
     from benchmarks.children import result_of
     from benchmarks.walks import alone, over_the_bus
     from quadriga.warm_up import warm_up
@@ -116,27 +116,7 @@ def walks(options: Options, console: Console, tell: Tell) -> Part:
         parts = result_of(alone, config, predictor)
         figures = over_the_bus(config, path, predictor, add_prefix(tell, f"n = {robots}"))
         rows.append({"robots": robots, "alone": parts, **figures})
-    return {
-        "rows": rows,
-        "planner": options.planner,
-        "seconds": options.seconds,
-        "recorder": None if options.quick else recorder_turns(options, rows, console, tell),
-    }
-
-
-def recorder_turns(options: Options, rows: list[Part], console: Console, tell: Tell) -> Part:
-    """Real-time factors of walks with and without recorder, in turns after the one in `rows`."""
-    from benchmarks.walks import over_the_bus
-
-    middle = options.middle
-    config, path, predictor = team(options, middle, options.seconds, console)
-    plain = replace(config, recorder=replace(config.recorder, enabled=False))
-    figures: Part = {"robots": middle, "with": [], "without": []}
-    figures["with"] += [row["rtf"] for row in rows if row["robots"] == middle]
-    for name, asked in (("without", plain), ("with", config), ("without", plain)):
-        tell(f"n = {middle}, {name} recorder")
-        figures[name].append(over_the_bus(asked, path, predictor, lambda _: None)["rtf"])
-    return figures
+    return {"rows": rows, "planner": options.planner, "seconds": options.seconds}
 
 
 def add_prefix(tell: Tell, prefix: str) -> Tell:

@@ -85,11 +85,6 @@ def over_the_bus(
     return {"rtf": factor, "tick_us": 1e3 / factor, "seconds": watch.seconds, "memory_mb": memory}
 
 
-def resident_mb(pid: int) -> float | None:
-    """Resident memory of a process, MB; None of one that has just left."""
-    return _memory(pid).get("rss")
-
-
 def _memory(pid: int) -> dict[str, float]:
     """Resident memory of a process, and its share where processes share pages, MB."""
     try:

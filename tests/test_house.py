@@ -24,8 +24,8 @@ BUDGETS: Final[Mapping[str, int]] = {
     "bridges": 1_904,
     "shared": 8_832,  # planned: 7,200; left: Unitree's protocols, the barrier; came: the plant link
     "quadriga": 39_638,  # planned: 18,200; left: harnesses of experiments, report, commands
-    "benchmarks": 4_265,  # planned: 1,800
-    "tests": 45_597,  # planned: 28,000; came: what a stranger packs, the release
+    "benchmarks": 2_079,  # planned: 1,800; left: plans as the paper writes them, endurance
+    "tests": 45_595,  # planned: 28,000; came: what a stranger packs, the release
 }
 COUNTED: Final = (".py", ".js", ".css", ".html")
 MOST_ARGUMENTS: Final = 8
