@@ -116,7 +116,8 @@ def compare(
 ) -> Row:
     """Run both on every case, in turns the first, and judge them, at bounds of forces too."""
     for case in cases[: config.team.robots]:
-        written.solve(case), ours.solve(case)  # the first call includes the set-up
+        for contender in (written, ours):
+            contender.solve(case)  # the first call includes the set-up
     bound = []
     for turn, case in enumerate(cases):
         exact = _reference(case)
@@ -186,13 +187,13 @@ class _Local:
         self._planners = [Planner(config, i, predictor) for i in robots]
         self._peers = [Peers(config, i, predictor) for i in robots]
         self._paper = [PaperQp(config.planner, G_u) for G_u in self._G_u]
-        self._problem, self._solver = cache(self._build), cache(self._build_solver)
+        self._set_up = cache(self._build)
 
     def cases(self, tick: PlanningTick) -> list[Case]:
         """The plans of one step; also makes the set-up that all ticks share."""
         made = []
         for i, stance in enumerate(tick.stance):
-            problem, _ = self._problem(i, stance.tobytes()), self._solver(i, stance.tobytes())
+            problem, _ = self._set_up(i, stance.tobytes())
             made.append(Case(tick, slice(i, i + 1), problem, self._free(tick, i), tick.y_des[i]))
         return made
 
@@ -206,7 +207,7 @@ class _Local:
 
     def solve(self, case: Case) -> Array:
         i, problem = case.robots.start, case.problem
-        solver = self._solver(i, case.tick.stance[i].tobytes())
+        _, solver = self._set_up(i, case.tick.stance[i].tobytes())
         solution = solver.solve(problem.condensed.F_des @ (case.y_des - case.y_free))
         du: Array = unpack(problem, solution.x, case.y_free)[0]
         return du
@@ -226,12 +227,9 @@ class _Local:
                 y = y + self._predictor.block(i, j) @ before
         return y
 
-    def _build(self, i: int, stance: bytes) -> PlannerProblem:
-        pattern = np.frombuffer(stance, dtype=np.bool_).reshape(-1, 4)
-        return build_problem(self._config.planner, self._config.robot.weight, self._G_u[i], pattern)
-
-    def _build_solver(self, i: int, stance: bytes) -> DaqpSolver:
-        return DaqpSolver(self._problem(i, stance))
+    def _build(self, i: int, stance: bytes) -> tuple[PlannerProblem, DaqpSolver]:
+        problem = _build_problem(self._config, self._G_u[i], stance)
+        return problem, DaqpSolver(problem)
 
 
 class _Team:
@@ -242,9 +240,9 @@ class _Team:
         G = np.block([[predictor.block(i, j) for j in robots] for i in robots])
         own = np.tile(np.arange(G.shape[1] // len(robots)) < past, len(robots))
         self._G_past, self._G_u = (np.ascontiguousarray(G[:, part]) for part in (own, ~own))
-        self._config, self._planner = config, build_centralised(config, predictor)
+        self._planner = build_centralised(config, predictor)
         self._paper = PaperQp(config.planner, self._G_u)
-        self._problem = cache(self._build)
+        self._problem = cache(lambda stance: _build_problem(config, self._G_u, stance))
 
     def case(self, tick: PlanningTick) -> Case:
         """The plan of one step."""
@@ -263,6 +261,8 @@ class _Team:
         y: Array = self._G_past @ tick.past.ravel()
         return y
 
-    def _build(self, stance: bytes) -> PlannerProblem:
-        pattern = np.frombuffer(stance, dtype=np.bool_).reshape(-1, 4)
-        return build_problem(self._config.planner, self._config.robot.weight, self._G_u, pattern)
+
+def _build_problem(config: Config, G_u: Array, stance: bytes) -> PlannerProblem:
+    """The condensed problem of a stance, (…, 4) as bytes, by which set-ups are kept."""
+    pattern = np.frombuffer(stance, dtype=np.bool_).reshape(-1, 4)
+    return build_problem(config.planner, config.robot.weight, G_u, pattern)
