@@ -44,7 +44,6 @@ from quadriga.commands import (
     status,
     stop,
     top,
-    tune,
     version,
     view,
     walk,
@@ -65,7 +64,7 @@ GROUPS: Final[Mapping[str, tuple[Callable[[AddCommand], None], ...]]] = MappingP
         ),
         "walk recordings again": (replay.add, resim.add, whatif.add),
         "experiments": (
-            campaign.add, experiments.add, fault.add, bench_stop.add, probe.add, tune.add,
+            campaign.add, experiments.add, fault.add, bench_stop.add, probe.add,
         ),
         "data and predictors": (prepare.add, collect.add, fit.add),
         "processes of a team, one by one": (
