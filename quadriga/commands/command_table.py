@@ -44,7 +44,6 @@ from quadriga.commands import (
     status,
     stop,
     top,
-    version,
     view,
     walk,
     whatif,
@@ -70,8 +69,6 @@ GROUPS: Final[Mapping[str, tuple[Callable[[AddCommand], None], ...]]] = MappingP
         "processes of a team, one by one": (
             sim.add, bridge.add, agent.add, plan.add, operate.add, record.add, router.add,
         ),
-        "certificates, configuration, shell": (
-            certs.add, config.add, completion.add, version.add,
-        ),
+        "certificates, configuration, shell": (certs.add, config.add, completion.add),
     }
 )  # fmt: skip

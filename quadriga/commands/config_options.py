@@ -53,7 +53,7 @@ _CONNECTING: Final = frozenset(
 UNCONFIGURED: Final = frozenset(
     (
         *("scenarios", "info", "check", "recover", "report", "export", "resim"),
-        *("experiments", "version", "completion"),
+        *("experiments", "completion"),
     )
 )
 _DEFAULTS: Final = Config()

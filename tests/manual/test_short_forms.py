@@ -56,7 +56,7 @@ _LIVE_ONCE: Final = frozenset(("top", "hz", "echo"))  # go on until the walk is 
 _JUDGES: Final = frozenset(("status", "stop", "resume"))
 # Commands that are run as they are typed; the status of some tells what they found.
 _LOOKING: Final = "check doctor echo export hz info replay report resim whatif"
-_LISTING: Final = "completion config experiments fault scenarios version"
+_LISTING: Final = "completion config experiments fault scenarios"
 _AS_TYPED: Final = frozenset((*_LOOKING.split(), *_LISTING.split(), "campaign", "certs"))
 _FINDS: Final = frozenset(("doctor", "replay"))
 

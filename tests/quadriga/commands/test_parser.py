@@ -293,12 +293,9 @@ def test_every_option_names_a_key() -> None:
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
-    status, out, _ = run(capsys, "version")
-    assert status == 0
-    assert out.startswith("quadriga")
     with pytest.raises(SystemExit, match="0"):
         main(["--version"])
-    assert capsys.readouterr().out == out
+    assert capsys.readouterr().out.startswith("quadriga")
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
