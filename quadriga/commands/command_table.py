@@ -43,7 +43,6 @@ from quadriga.commands import (
     sim,
     status,
     stop,
-    top,
     view,
     walk,
     whatif,
@@ -54,8 +53,7 @@ from quadriga.commands.command import AddCommand
 GROUPS: Final[Mapping[str, tuple[Callable[[AddCommand], None], ...]]] = MappingProxyType(
     {
         "walk and watch": (
-            walk.add, scenarios.add, view.add, drive.add, top.add, status.add, echo.add, hz.add,
-            doctor.add,
+            walk.add, scenarios.add, view.add, drive.add, status.add, echo.add, hz.add, doctor.add,
         ),
         "stop and go on": (estop.add, stop.add, reset.add, resume.add),
         "look into recordings": (
