@@ -24,7 +24,6 @@ from quadriga.commands import (
     export,
     fault,
     fit,
-    hz,
     info,
     operate,
     plan,
@@ -53,7 +52,7 @@ from quadriga.commands.command import AddCommand
 GROUPS: Final[Mapping[str, tuple[Callable[[AddCommand], None], ...]]] = MappingProxyType(
     {
         "walk and watch": (
-            walk.add, scenarios.add, view.add, drive.add, status.add, echo.add, hz.add, doctor.add,
+            walk.add, scenarios.add, view.add, drive.add, status.add, echo.add, doctor.add,
         ),
         "stop and go on": (estop.add, stop.add, reset.add, resume.add),
         "look into recordings": (

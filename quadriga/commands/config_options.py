@@ -45,7 +45,7 @@ KEYS_OF: Final = {"bridge": {"interface": "bridge.interface"}}
 _CONNECTING: Final = frozenset(
     (
         *("sim", "bridge", "agent", "plan", "operate", "record", "estop", "stop", "reset"),
-        *("resume", "doctor", "echo", "hz", "status", "play"),
+        *("resume", "doctor", "echo", "status", "play"),
     )
 )
 

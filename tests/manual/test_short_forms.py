@@ -51,11 +51,11 @@ _PREPARED: Final = ("--robots", "2", "--set", "identification.seconds=60", "--se
 _ALONE: Final = ("--robots", "1", "--planner", "none", "--seconds", "600")
 _LIMIT: Final = 120.0  # s, far more than a short walk takes on a busy machine
 WALKED: Final = 40  # ticks of a walk's short form
-_LIVE_ONCE: Final = frozenset(("hz", "echo", "--watch"))  # go on until the walk is over, without -n
+_LIVE_ONCE: Final = frozenset(("echo", "--watch"))  # go on until the walk is over, without -n
 # Whose status tells how a team is, or what it did within seconds: a busy machine takes longer.
 _JUDGES: Final = frozenset(("status", "stop", "resume"))
 # Commands that are run as they are typed; the status of some tells what they found.
-_LOOKING: Final = "check doctor echo export hz info replay report resim whatif"
+_LOOKING: Final = "check doctor echo export info replay report resim whatif"
 _LISTING: Final = "completion config experiments fault scenarios"
 _AS_TYPED: Final = frozenset((*_LOOKING.split(), *_LISTING.split(), "campaign", "certs"))
 _FINDS: Final = frozenset(("doctor", "replay"))

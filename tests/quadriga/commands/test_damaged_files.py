@@ -20,7 +20,7 @@ VERBS: dict[str, tuple[str, ...]] = {
     "check": ("check", "FILE"),
     "recover": ("recover", "FILE", "-o", "OUT"),
     "echo": ("echo", "**", "--file", "FILE"),
-    "hz": ("hz", "--file", "FILE"),
+    "echo --rates": ("echo", "--rates", "--file", "FILE"),
 }
 
 
