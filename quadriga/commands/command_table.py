@@ -38,7 +38,6 @@ from quadriga.commands import (
     resim,
     resume,
     router,
-    scenarios,
     sim,
     status,
     stop,
@@ -52,7 +51,7 @@ from quadriga.commands.command import AddCommand
 GROUPS: Final[Mapping[str, tuple[Callable[[AddCommand], None], ...]]] = MappingProxyType(
     {
         "walk and watch": (
-            walk.add, scenarios.add, view.add, drive.add, status.add, echo.add, doctor.add,
+            walk.add, view.add, drive.add, status.add, echo.add, doctor.add,
         ),
         "stop and go on": (estop.add, stop.add, reset.add, resume.add),
         "look into recordings": (

@@ -51,10 +51,7 @@ _CONNECTING: Final = frozenset(
 
 # Commands without one: what they read is a file with its own, or none at all.
 UNCONFIGURED: Final = frozenset(
-    (
-        *("scenarios", "info", "check", "recover", "report", "export", "resim"),
-        *("experiments", "completion"),
-    )
+    (*("info", "check", "recover", "report", "export", "resim"), *("experiments", "completion"))
 )
 _DEFAULTS: Final = Config()
 _ABOUT: Final = (
@@ -86,7 +83,7 @@ def build_config_options(command: str, *, hidden: bool) -> argparse.ArgumentPars
     add(
         "--scenario",
         metavar="NAME",
-        help="start from a scenario's keys; see `quadriga scenarios`; --config and "
+        help="start from a scenario's keys; see `quadriga walk --list`; --config and "
         "all other options win over it; a TOML file will do, too",
     )
     add("--config", type=Path, metavar="FILE", help="TOML; see `quadriga config`")

@@ -192,9 +192,9 @@ def test_who_reads_no_configuration_takes_none(
             "(`quadriga info --help` tells what it takes)",
         ),
         (
-            ["scenarios", "hard-blocks"],
-            "scenarios: got 'hard-blocks', expected nothing but options "
-            "(`quadriga scenarios --help` tells what it takes)",
+            ["walk", "moonwalk"],
+            "walk: got 'moonwalk', expected nothing but options "
+            "(`quadriga walk --help` tells what it takes)",
         ),
         (["walk", "-vx"], "walk: got '-vx', expected nothing but options (did you mean '--vx'?)"),
     ],
