@@ -12,7 +12,6 @@ from quadriga.commands import (
     bridge,
     campaign,
     certs,
-    check,
     collect,
     completion,
     config,
@@ -55,7 +54,7 @@ GROUPS: Final[Mapping[str, tuple[Callable[[AddCommand], None], ...]]] = MappingP
         ),
         "stop and go on": (estop.add, stop.add, reset.add, resume.add),
         "look into recordings": (
-            report.add, info.add, check.add, play.add, export.add, recover.add,
+            report.add, info.add, play.add, export.add, recover.add,
         ),
         "walk recordings again": (replay.add, resim.add, whatif.add),
         "experiments": (

@@ -70,7 +70,7 @@ def test_stopped_released_and_sent_on(
     assert (told[-1], traces.events[-1].detail.partition(";")[0]) == (STOPPED, "night")
     team.replay()
     if mode == "lockstep":
-        for words in (["replay", "--all"], ["check"], ["resim"]):
+        for words in (["replay", "--all"], ["info", "--check"], ["resim"]):
             assert main([words[0], str(team.folder / "run.mcap"), *words[1:]]) == 0
 
 

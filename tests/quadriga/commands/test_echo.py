@@ -81,7 +81,8 @@ def test_rates_are_those_of_keys_with_intervals_and_gaps(
 
 
 @pytest.mark.parametrize(
-    "words", [("echo", "**", "--file"), ("echo", "--rates", "--file"), ("info",), ("check",)]
+    "words",
+    [("echo", "**", "--file"), ("echo", "--rates", "--file"), ("info",), ("info", "--check")],
 )
 def test_nothing_that_was_recorded_steers_the_terminal(
     tmp_path: Path, run_command: RunCommand, words: tuple[str, ...]
