@@ -34,7 +34,6 @@ from quadriga.commands import (
     replay,
     report,
     reset,
-    resim,
     resume,
     router,
     sim,
@@ -42,7 +41,6 @@ from quadriga.commands import (
     stop,
     view,
     walk,
-    whatif,
 )
 from quadriga.commands.command import AddCommand
 
@@ -54,9 +52,8 @@ GROUPS: Final[Mapping[str, tuple[Callable[[AddCommand], None], ...]]] = MappingP
         ),
         "stop and go on": (estop.add, stop.add, reset.add, resume.add),
         "look into recordings": (
-            report.add, info.add, play.add, export.add, recover.add,
+            report.add, info.add, replay.add, play.add, export.add, recover.add,
         ),
-        "walk recordings again": (replay.add, resim.add, whatif.add),
         "experiments": (
             campaign.add, experiments.add, fault.add, bench_stop.add, probe.add,
         ),

@@ -51,7 +51,7 @@ _CONNECTING: Final = frozenset(
 
 # Commands without one: what they read is a file with its own, or none at all.
 UNCONFIGURED: Final = frozenset(
-    (*("info", "recover", "report", "export", "resim"), *("experiments", "completion"))
+    ("info", "recover", "report", "export", "experiments", "completion")
 )
 _DEFAULTS: Final = Config()
 _ABOUT: Final = (

@@ -55,7 +55,7 @@ _LIVE_ONCE: Final = frozenset(("echo", "--watch"))  # go on until the walk is ov
 # Whose status tells how a team is, or what it did within seconds: a busy machine takes longer.
 _JUDGES: Final = frozenset(("status", "stop", "resume"))
 # Commands that are run as they are typed; the status of some tells what they found.
-_LOOKING: Final = "doctor echo export info replay report resim whatif"
+_LOOKING: Final = "doctor echo export info replay report"
 _LISTING: Final = "completion config experiments fault"
 _AS_TYPED: Final = frozenset((*_LOOKING.split(), *_LISTING.split(), "campaign", "certs"))
 _FINDS: Final = frozenset(("doctor", "replay"))
