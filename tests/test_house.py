@@ -23,9 +23,9 @@ BUDGETS: Final[Mapping[str, int]] = {
     "sim_server": 2_656,  # planned: 2,600
     "bridges": 1_904,
     "shared": 8_832,  # planned: 7,200; left: Unitree's protocols, the barrier; came: the plant link
-    "quadriga": 39_638,  # planned: 18,200; left: harnesses of experiments, report, commands
+    "quadriga": 39_063,  # planned: 18,200; left: harnesses of experiments, report, commands
     "benchmarks": 4_265,  # planned: 1,800
-    "tests": 45_465,  # planned: 28,000
+    "tests": 45_237,  # planned: 28,000
 }
 COUNTED: Final = (".py", ".js", ".css", ".html")
 MOST_ARGUMENTS: Final = 8
