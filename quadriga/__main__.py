@@ -13,7 +13,7 @@ _STOP: Final = "estop"
 _FEW_COLLECTIONS: Final = 50_000  # new objects between two; imports make many and no garbage
 _WRONG: Final = 2
 _INTERRUPTED: Final = 130
-_ENDLESS: Final = ("echo", "hz", "top")  # they only show, until nobody reads any more
+_ENDLESS: Final = ("echo", "status")  # they only show, until nobody reads any more
 
 
 class _Unread(io.FileIO):

@@ -24,7 +24,7 @@ RESET: Final = "reset"  # releases an emergency stop, once
 RESUME: Final = "resume"  # has a team that stands go on, once
 SPEAKERS: Final = (ESTOP, STOP, RESET, RESUME)  # they see what comes of their word
 DOCTOR: Final = "doctor"  # asks everybody how they are
-OBSERVER: Final = "observer"  # whoever looks on: `echo`, `hz`
+OBSERVER: Final = "observer"  # whoever looks on: `echo`
 
 # Who drives time, by name: the only plant, or that of the first robot. The others leave with it.
 LEADS: Final = frozenset((SIM, "plant_r1"))

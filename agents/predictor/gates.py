@@ -52,7 +52,7 @@ class Bounds(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class GateReport:
-    """Figures of a predictor, stored in its file; `check` holds them against their limits.
+    """Figures of a predictor, stored in its file; `info --check` holds them against their limits.
 
     Attributes:
         error: scaled held-out error of all outputs together over that of persistence.

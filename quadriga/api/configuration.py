@@ -29,7 +29,7 @@ def load_config(
 
     Args:
         path: a TOML file, as `quadriga config` writes one; None: no file.
-        scenario: the name of a scenario, see `quadriga scenarios`, or a TOML file; None: none.
+        scenario: the name of a scenario, see `quadriga walk --list`, or a TOML file; None: none.
         set: values by `section.key`; they win over all others.
 
     Raises:

@@ -44,7 +44,7 @@ def walk(
         >>> print(run.summary["fallen"], run.folder)
 
     Args:
-        scenario: the name of a scenario, see `quadriga scenarios`, or a TOML file.
+        scenario: the name of a scenario, see `quadriga walk --list`, or a TOML file.
         seed: of the world (`world.seed`).
         robots: how many (`team.robots`).
         seconds: of world time (`world.duration`).

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from quadriga.shared.config.sections import Config
@@ -27,6 +27,26 @@ AddCommand = Callable[[str, Run, str], argparse.ArgumentParser]
 def say(text: str) -> None:
     """Tell the user something beside a command's output."""
     print(f"quadriga: {printable_line(text)}", file=sys.stderr, flush=True)
+
+
+def check_options_beside(
+    switch: str, chosen: bool, needing: Mapping[str, object], excluding: Mapping[str, object]
+) -> None:
+    """See that no option is given that would be ignored.
+
+    Args:
+        switch: an option that changes what the command does.
+        chosen: whether it is given.
+        needing: by their name the values of options that mean something with it alone.
+        excluding: of those that mean nothing with it; None or False if one is not given.
+
+    Raises:
+        ConfigError: there is such an option.
+    """
+    for name, value in (excluding if chosen else needing).items():
+        if value is not None and value is not False:
+            got = f"{switch} beside it" if chosen else f"no {switch} beside it"
+            raise ConfigError(name, got, "one of the two" if chosen else "both, or none of the two")
 
 
 def refuse_configuration(given: Given) -> None:

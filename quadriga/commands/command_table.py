@@ -12,7 +12,6 @@ from quadriga.commands import (
     bridge,
     campaign,
     certs,
-    check,
     collect,
     completion,
     config,
@@ -24,7 +23,6 @@ from quadriga.commands import (
     export,
     fault,
     fit,
-    hz,
     info,
     operate,
     plan,
@@ -36,19 +34,13 @@ from quadriga.commands import (
     replay,
     report,
     reset,
-    resim,
     resume,
     router,
-    scenarios,
     sim,
     status,
     stop,
-    top,
-    tune,
-    version,
     view,
     walk,
-    whatif,
 )
 from quadriga.commands.command import AddCommand
 
@@ -56,23 +48,19 @@ from quadriga.commands.command import AddCommand
 GROUPS: Final[Mapping[str, tuple[Callable[[AddCommand], None], ...]]] = MappingProxyType(
     {
         "walk and watch": (
-            walk.add, scenarios.add, view.add, drive.add, top.add, status.add, echo.add, hz.add,
-            doctor.add,
+            walk.add, view.add, drive.add, status.add, echo.add, doctor.add,
         ),
         "stop and go on": (estop.add, stop.add, reset.add, resume.add),
         "look into recordings": (
-            report.add, info.add, check.add, play.add, export.add, recover.add,
+            report.add, info.add, replay.add, play.add, export.add, recover.add,
         ),
-        "walk recordings again": (replay.add, resim.add, whatif.add),
         "experiments": (
-            campaign.add, experiments.add, fault.add, bench_stop.add, probe.add, tune.add,
+            campaign.add, experiments.add, fault.add, bench_stop.add, probe.add,
         ),
         "data and predictors": (prepare.add, collect.add, fit.add),
         "processes of a team, one by one": (
             sim.add, bridge.add, agent.add, plan.add, operate.add, record.add, router.add,
         ),
-        "certificates, configuration, shell": (
-            certs.add, config.add, completion.add, version.add,
-        ),
+        "certificates, configuration, shell": (certs.add, config.add, completion.add),
     }
 )  # fmt: skip

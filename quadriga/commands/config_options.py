@@ -45,16 +45,13 @@ KEYS_OF: Final = {"bridge": {"interface": "bridge.interface"}}
 _CONNECTING: Final = frozenset(
     (
         *("sim", "bridge", "agent", "plan", "operate", "record", "estop", "stop", "reset"),
-        *("resume", "doctor", "echo", "hz", "top", "status", "play"),
+        *("resume", "doctor", "echo", "status", "play"),
     )
 )
 
 # Commands without one: what they read is a file with its own, or none at all.
 UNCONFIGURED: Final = frozenset(
-    (
-        *("scenarios", "info", "check", "recover", "report", "export", "resim"),
-        *("experiments", "tune", "version", "completion"),
-    )
+    ("info", "recover", "report", "export", "experiments", "completion")
 )
 _DEFAULTS: Final = Config()
 _ABOUT: Final = (
@@ -86,7 +83,7 @@ def build_config_options(command: str, *, hidden: bool) -> argparse.ArgumentPars
     add(
         "--scenario",
         metavar="NAME",
-        help="start from a scenario's keys; see `quadriga scenarios`; --config and "
+        help="start from a scenario's keys; see `quadriga walk --list`; --config and "
         "all other options win over it; a TOML file will do, too",
     )
     add("--config", type=Path, metavar="FILE", help="TOML; see `quadriga config`")

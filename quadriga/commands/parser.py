@@ -8,7 +8,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from functools import cache
 from itertools import takewhile
-from typing import Final
+from typing import Any, Final
 
 from quadriga.commands.command import Run
 from quadriga.commands.command_table import GROUPS
@@ -16,7 +16,6 @@ from quadriga.commands.config_options import build_config_options, describe_key,
 from quadriga.commands.mistakes import check_words, refuse_strays
 from quadriga.commands.options import READ_AS
 from quadriga.commands.running import registered
-from quadriga.commands.version import ShowVersion
 from quadriga.shared.errors import ConfigError, ProcessError, QuadrigaError, remedy, system_reason
 from quadriga.shared.printable import printable, printable_line
 from quadriga.shared.runtime.signals import die_with_parent, interrupt_on_sigterm, kill_if_orphaned
@@ -30,6 +29,21 @@ _MORE: Final = (
     "`quadriga COMMAND --help` shows the options of a command. Every command reads one\n"
     "configuration: defaults, then --scenario, then --config, then options."
 )
+
+
+class _ShowVersion(argparse.Action):
+    """The option that prints the version; to look it up takes 20 ms, so only then."""
+
+    def __init__(self, **named: Any) -> None:
+        super().__init__(nargs=0, **named)
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        """Print it and end."""
+        from quadriga.shared.runtime.installed import project_version
+
+        version = project_version()
+        print(f"quadriga {version}" if version else "quadriga, from a folder that is not installed")
+        parser.exit()
 
 
 class CommandLine(argparse.ArgumentParser):
@@ -128,7 +142,7 @@ def build_parser(*, everything: bool = False) -> CommandLine:
         description=_ABOUT,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    top.add_argument("--version", action=ShowVersion, help="print the version")
+    top.add_argument("--version", action=_ShowVersion, help="print the version")
     commands = top.add_subparsers(
         metavar="COMMAND",
         required=True,

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 # Commands for a team that runs already.
 _LIVE: Final = frozenset(
-    ("estop", "stop", "resume", "reset", "echo", "hz", "record", "doctor", "status", "top", "view")
+    ("estop", "stop", "resume", "reset", "echo", "record", "doctor", "status", "view")
 )
 _LIVE_IF: Final = {"fault": "live"}  # by the option that asks for it
 # With one of these nothing is asked of a team: `echo --file`, `doctor --here`, `view RUN`.

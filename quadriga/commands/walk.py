@@ -20,6 +20,9 @@ _DRIVEN_SECONDS: Final = 3600.0
 
 def add(add_command: AddCommand) -> None:
     command = add_command("walk", run, "start all processes, walk, and show what came of it")
+    command.add_argument(
+        "--list", action="store_true", help="list the scenarios that can be walked, and do not walk"
+    )
     command.add_argument("--out", type=Path, metavar="DIR", help="run folder (runs/<date>-<time>)")
     command.add_argument(
         "--armed",
@@ -59,6 +62,8 @@ def run(arguments: argparse.Namespace, config: Config, given: Given) -> int:
     from quadriga.team.walk import walk
     from quadriga.view.port import choose_port, is_at_display
 
+    if arguments.list:
+        return _list_scenarios()
     config = with_free_endpoint(config, given)
     if arguments.drive:
         config = _driven(config, given)
@@ -73,6 +78,22 @@ def run(arguments: argparse.Namespace, config: Config, given: Given) -> int:
         armed=arguments.armed,
         view=choose_port(arguments.view, wanted=not arguments.no_view and is_at_display()),
     )
+
+
+def _list_scenarios() -> int:
+    """Print a table of names and descriptions."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from quadriga.team.scenarios import description, names
+
+    table = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
+    table.add_column(no_wrap=True, style="bold")
+    table.add_column()
+    for name in names():
+        table.add_row(name, description(name))
+    Console().print(table)
+    return 0
 
 
 def _report(arguments: argparse.Namespace) -> Report:

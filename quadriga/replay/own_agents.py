@@ -18,5 +18,5 @@ def require_own_agents(recording: Recording, config: Config) -> None:
             str(recording.path),
             f"commands of the controller {config.team.agent_command!r}",
             "commands of the project's own agents",
-            "a controller of one's own cannot be recomputed; the world can: `quadriga resim`",
+            "a controller of one's own cannot be recomputed; the world can: `replay --world`",
         )

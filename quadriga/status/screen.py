@@ -1,4 +1,4 @@
-"""SHELL of `quadriga top`: a status again and again, in a terminal or as lines."""
+"""SHELL of `quadriga status --watch`: a status again and again, in a terminal or as lines."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ def path(name: str) -> Path:
             "--scenario",
             repr(name),
             "the name of a scenario, or a TOML file",
-            did_you_mean(name, names()) or "`quadriga scenarios` lists them",
+            did_you_mean(name, names()) or "`quadriga walk --list` lists them",
         )
     return SCENARIOS / f"{name}{_SUFFIX}"
 

@@ -1,4 +1,4 @@
-"""SHELL of `quadriga whatif`: what is asked, a bar while the branch walks, and what came of it."""
+"""SHELL of `quadriga replay --from`: the question, a bar while the branch walks, the answer."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Texts that people write: configurations, experiments, tunings, traces of references."""
+"""Texts that people write: configurations, experiments, traces of references."""
 
 from __future__ import annotations
 

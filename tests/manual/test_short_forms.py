@@ -51,12 +51,12 @@ _PREPARED: Final = ("--robots", "2", "--set", "identification.seconds=60", "--se
 _ALONE: Final = ("--robots", "1", "--planner", "none", "--seconds", "600")
 _LIMIT: Final = 120.0  # s, far more than a short walk takes on a busy machine
 WALKED: Final = 40  # ticks of a walk's short form
-_LIVE_ONCE: Final = frozenset(("top", "hz", "echo"))  # go on until the walk is over, without -n
+_LIVE_ONCE: Final = frozenset(("echo", "--watch"))  # go on until the walk is over, without -n
 # Whose status tells how a team is, or what it did within seconds: a busy machine takes longer.
 _JUDGES: Final = frozenset(("status", "stop", "resume"))
 # Commands that are run as they are typed; the status of some tells what they found.
-_LOOKING: Final = "check doctor echo export hz info replay report resim whatif"
-_LISTING: Final = "completion config experiments fault scenarios version"
+_LOOKING: Final = "doctor echo export info replay report"
+_LISTING: Final = "completion config experiments fault"
 _AS_TYPED: Final = frozenset((*_LOOKING.split(), *_LISTING.split(), "campaign", "certs"))
 _FINDS: Final = frozenset(("doctor", "replay"))
 
@@ -106,8 +106,10 @@ def run_short(words: Sequence[str]) -> None:
     if read is None:
         return
     command, config, _ = read
-    if command != "walk":
-        assert command in _AS_TYPED, f"{command} has no short form: say why it is not run"
+    if command != "walk" or "--list" in words:
+        assert command in (*_AS_TYPED, "walk"), (
+            f"{command} has no short form: say why it is not run"
+        )
         _run(words, (0, 1) if command in _FINDS else (0,))
     elif "--out" in words:
         _walk(words)
@@ -117,7 +119,7 @@ def run_short(words: Sequence[str]) -> None:
 
 def run_live(words: Sequence[str]) -> None:
     """Run a command to a team that walks; one that would go on until its end, once."""
-    once = ("-n", "1") if words[0] in _LIVE_ONCE and "-n" not in words else ()
+    once = ("-n", "1") if _LIVE_ONCE & {*words} and "-n" not in words else ()
     _run([*words, *once], (0, 1) if words[0] in _JUDGES else (0,))
 
 

@@ -116,7 +116,7 @@ def check_recording(team: Team, code: str, what: str, capsys: pytest.CaptureFixt
     recording.require_whole()
     assert recording.notes[END]["code"] == code
     assert "end" in {finding.name for finding in check(recording.path) if not finding.passed}
-    assert main(["check", path]) == 1
+    assert main(["info", "--check", path]) == 1
     assert main(["info", path]) == 0
     assert capsys.readouterr().out.count(f"{what}: none any more after") == 2
     assert summary_of(read_traces(recording))["end_code"] == code

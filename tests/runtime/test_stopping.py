@@ -70,7 +70,7 @@ def test_stopped_released_and_sent_on(
     assert (told[-1], traces.events[-1].detail.partition(";")[0]) == (STOPPED, "night")
     team.replay()
     if mode == "lockstep":
-        for words in (["replay", "--all"], ["check"], ["resim"]):
+        for words in (["replay", "--all"], ["info", "--check"], ["replay", "--world"]):
             assert main([words[0], str(team.folder / "run.mcap"), *words[1:]]) == 0
 
 
@@ -90,5 +90,5 @@ def test_a_walk_with_a_fault_that_somebody_asked_for_is_the_same_world_when_re_s
     out, err = capsys.readouterr()
     assert ": r1/imu garbage " in out
     assert "robot 'r2'" in err
-    assert main(["resim", str(team.folder / "run.mcap")]) == 0
+    assert main(["replay", "--world", str(team.folder / "run.mcap")]) == 0
     assert "equal to the byte" in capsys.readouterr().out

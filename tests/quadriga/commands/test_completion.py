@@ -44,7 +44,7 @@ def complete(*words: str) -> set[str]:
     ("words", "offered"),
     [
         (("quadriga", "ech"), {"echo"}),
-        (("quadriga", "re"), {"record", "recover", "replay", "report", "reset", "resim", "resume"}),
+        (("quadriga", "re"), {"record", "recover", "replay", "report", "reset", "resume"}),
         (("quadriga", "walk", "--mo"), {"--mode"}),
         (("quadriga", "walk", "--ou"), {"--out"}),
         (("quadriga", "walk", "--mode", ""), {"lockstep", "realtime"}),

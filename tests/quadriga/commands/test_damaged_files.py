@@ -17,10 +17,10 @@ from tests.quadriga.commands.conftest import RunCommand
 
 VERBS: dict[str, tuple[str, ...]] = {
     "info": ("info", "FILE"),
-    "check": ("check", "FILE"),
+    "info --check": ("info", "--check", "FILE"),
     "recover": ("recover", "FILE", "-o", "OUT"),
     "echo": ("echo", "**", "--file", "FILE"),
-    "hz": ("hz", "--file", "FILE"),
+    "echo --rates": ("echo", "--rates", "--file", "FILE"),
 }
 
 
@@ -67,7 +67,7 @@ def test_a_cut_file_gives_one_clear_error_and_what_is_readable(
     if verb == "recover":
         assert (status, err) == (0, "")
         assert lines[0].startswith("damaged: a file that is cut after")
-    elif verb == "check":
+    elif verb == "info --check":
         assert (status, err) == (1, "")
         assert lines[0].startswith("FAIL  whole")
     else:
@@ -141,5 +141,5 @@ def test_the_configuration_of_a_damaged_file_may_be_gone(
     assert any("team/r1/state" in line for line in lines)
     status, lines, _ = run_command("recover", path)
     assert "lost: configuration and versions, no copy of them is intact" in lines
-    assert run_command("check", path)[0] == 2
+    assert run_command("info", "--check", path)[0] == 2
     assert json.loads(Recording(small).metadata["config_json"])["world"]["seed"] == 7

@@ -192,9 +192,9 @@ def test_who_reads_no_configuration_takes_none(
             "(`quadriga info --help` tells what it takes)",
         ),
         (
-            ["scenarios", "hard-blocks"],
-            "scenarios: got 'hard-blocks', expected nothing but options "
-            "(`quadriga scenarios --help` tells what it takes)",
+            ["walk", "moonwalk"],
+            "walk: got 'moonwalk', expected nothing but options "
+            "(`quadriga walk --help` tells what it takes)",
         ),
         (["walk", "-vx"], "walk: got '-vx', expected nothing but options (did you mean '--vx'?)"),
     ],
@@ -293,12 +293,9 @@ def test_every_option_names_a_key() -> None:
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
-    status, out, _ = run(capsys, "version")
-    assert status == 0
-    assert out.startswith("quadriga")
     with pytest.raises(SystemExit, match="0"):
         main(["--version"])
-    assert capsys.readouterr().out == out
+    assert capsys.readouterr().out.startswith("quadriga")
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

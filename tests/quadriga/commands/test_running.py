@@ -53,7 +53,7 @@ def add_other(folder: Path, name: str) -> None:
         ["estop"],
         ["resume"],
         ["echo", "clock"],
-        ["hz"],
+        ["echo", "--rates"],
         ["record"],
         ["doctor"],
         ["fault", "--live", "r1/imu", "stuck"],

@@ -1,4 +1,4 @@
-"""`quadriga check`: a good recording passes, and every broken rule is found at its message."""
+"""`quadriga info --check`: a good recording passes, a broken rule is found at its message."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def failed(findings: list[Finding]) -> set[str]:
 
 
 def test_a_good_recording_passes(known_run: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["check", str(known_run / "run.mcap")]) == 0
+    assert main(["info", "--check", str(known_run / "run.mcap")]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[:2] for line in lines] == [
         ["ok", name]
@@ -346,7 +346,7 @@ def test_a_damaged_file_fails_and_the_rest_is_checked(
     content = bytearray((known_run / "run.mcap").read_bytes())
     content[content.index(b"lz4", len(content) // 2) + 100] ^= 1
     (tmp_path / "run.mcap").write_bytes(content)
-    assert main(["check", str(tmp_path / "run.mcap")]) == 1
+    assert main(["info", "--check", str(tmp_path / "run.mcap")]) == 1
     out = capsys.readouterr().out
     assert re.match(r"FAIL  whole +[\d,]+ of 26,264 messages missing", out)
     assert "its checksum is wrong" in out

@@ -1,4 +1,4 @@
-"""`quadriga echo` and `hz` on a live bus, as processes of their own that nobody waits for."""
+"""`quadriga echo` on a live bus, as processes of their own that nobody waits for."""
 
 from __future__ import annotations
 
@@ -73,8 +73,8 @@ def test_echo_hears_the_bus(config: Config, world: Bus) -> None:
     assert world.members_at(HERE) == frozenset()  # it has never said that it is a member
 
 
-def test_hz_counts_what_comes_and_what_does_not(config: Config, world: Bus) -> None:
-    listener = listen(config, "hz", "r1/state", "-n", "2", "--every", "0.7")
+def test_rates_count_what_comes_and_what_does_not(config: Config, world: Bus) -> None:
+    listener = listen(config, "echo", "--rates", "r1/state", "-n", "2", "--every", "0.7")
     out, err = talk(world, listener)
     assert (listener.returncode, err) == (0, "")
     tables = out.strip().split("\n\n")

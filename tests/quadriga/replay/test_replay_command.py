@@ -80,6 +80,7 @@ def test_mistakes_on_the_command_line(run: Path, capsys: pytest.CaptureFixture[s
     for arguments, output in (
         ((run, "--robot", "r2"), "--robot: got 'r2', expected one of r1"),
         ((run.parent / "no.mcap", "--all"), "no.mcap: got No such file"),
+        ((run,), "replay: got nothing to run again, expected --robot NAME, --all, --world or --"),
         ((run, "--all", "--break", "1"), "--break: got --all, expected --robot NAME"),
         ((run, "--robot", "r1", "--break", "nan"), "--break: got nan, expected a time [s]"),
         ((run, "--robot", "r1", "--break", "9"), "--break: got 9 s, expected a time up to 0.004 s"),

@@ -1,4 +1,4 @@
-"""A look at a team on a real bus, and `quadriga top` where there is none."""
+"""A look at a team on a real bus, and `quadriga status --watch` where there is none."""
 
 from __future__ import annotations
 
@@ -95,16 +95,25 @@ def test_who_is_not_there_makes_the_status_1(
     assert main(["status", "--seconds-heard", "nan"]) == 2
 
 
-def test_top_without_a_terminal_prints_lines_until_it_is_interrupted() -> None:
-    top = subprocess.Popen(
-        [sys.executable, "-m", "quadriga", "top", "--endpoint", free_endpoint(), "--every", "0.2"],
+@pytest.mark.parametrize("words", [("--every", "2"), ("--watch", "--json"), ("-n", "0")])
+def test_an_option_that_would_be_ignored_is_refused(
+    words: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["status", *words]) == 2
+    assert "--watch beside it" in capsys.readouterr().err
+
+
+def test_watch_without_a_terminal_prints_lines_until_it_is_interrupted() -> None:
+    options = ("--watch", "--endpoint", free_endpoint(), "--every", "0.2")
+    watch = subprocess.Popen(
+        [sys.executable, "-m", "quadriga", "status", *options],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
     )
-    assert top.stdout is not None
-    assert top.stdout.readline().startswith("team 'team' at tcp/127.")
-    assert "\x1b" not in top.stdout.readline()
-    top.send_signal(signal.SIGINT)
-    _, err = top.communicate(timeout=WAIT)
-    assert (top.returncode, err) == (0, "")
+    assert watch.stdout is not None
+    assert watch.stdout.readline().startswith("team 'team' at tcp/127.")
+    assert "\x1b" not in watch.stdout.readline()
+    watch.send_signal(signal.SIGINT)
+    _, err = watch.communicate(timeout=WAIT)
+    assert (watch.returncode, err) == (0, "")

@@ -91,10 +91,10 @@ def test_no_process_imports_from_the_working_directory(
     for name in ("json", "numpy", "pickle", "random", "zenoh"):
         (tmp_path / f"{name}.py").write_text("raise ImportError('of the working directory')")
     monkeypatch.chdir(tmp_path)
-    alone = subprocess.run([*QUADRIGA, "version"], capture_output=True, check=False)
+    alone = subprocess.run([*QUADRIGA, "config"], capture_output=True, check=False)
     assert (alone.returncode, alone.stderr) == (0, b"")
-    log = tmp_path / "version.log"
-    (process,) = start(Fork(("version",), str(log)))
+    log = tmp_path / "config.log"
+    (process,) = start(Fork(("config",), str(log)))
     assert (process.wait(WAIT), log.read_bytes()) == (0, alone.stdout)
     assert dict(run_each(os.getenv, ["PYTHONSAFEPATH"], 1)) == {"PYTHONSAFEPATH": None}
 

@@ -120,7 +120,7 @@ def test_any_file_is_a_scenario(capsys: pytest.CaptureFixture[str], tmp_path: Pa
 
 @pytest.mark.parametrize(
     ("name", "cause"),
-    [("gravel", "did you mean 'gravel-3'?"), ("qqq", "`quadriga scenarios` lists them")],
+    [("gravel", "did you mean 'gravel-3'?"), ("qqq", "`quadriga walk --list` lists them")],
 )
 def test_a_wrong_name_is_one_error_that_tells_the_right_one(
     capsys: pytest.CaptureFixture[str], name: str, cause: str
@@ -149,7 +149,7 @@ def test_a_file_over_a_scenario_is_checked_as_any(tmp_path: Path, text: str, mes
 
 
 def test_the_list_says_what_each_is(capsys: pytest.CaptureFixture[str]) -> None:
-    status, out, _ = run(capsys, "scenarios")
+    status, out, _ = run(capsys, "walk", "--list")
     assert status == 0
     for name in PROMISED:
         assert f"{name} " in out

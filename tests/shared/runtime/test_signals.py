@@ -136,7 +136,7 @@ PROGRAM = """
 import os, sys
 folder, how = sys.argv[1:]
 sys.path.insert(0, folder)
-from quadriga.commands import version
+from quadriga.commands import config
 
 def run(*_):
     if how == "import":
@@ -148,9 +148,9 @@ def run(*_):
     while True:
         pass
 
-version.run = run
+config.run = run
 from quadriga.commands import parser
-sys.argv = ["quadriga", "version"]
+sys.argv = ["quadriga", "config"]
 from quadriga.__main__ import main
 sys.exit(main())
 """

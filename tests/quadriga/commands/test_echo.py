@@ -1,4 +1,4 @@
-"""`quadriga echo` and `hz` of recordings."""
+"""`quadriga echo` of recordings."""
 
 from __future__ import annotations
 
@@ -41,10 +41,22 @@ def test_echo_shows_what_is_no_message(tmp_path: Path, run_command: RunCommand) 
 
 
 def test_a_key_that_is_not_there_is_no_silence(small: Path, run_command: RunCommand) -> None:
-    for verb in ("echo", "hz"):
-        status, _, err = run_command(verb, "r7", "r1/stat", "--file", small)
+    for options in ((), ("--rates",)):
+        status, _, err = run_command("echo", *options, "r7", "r1/stat", "--file", small)
         assert (status, err.count("\n")) == (2, 1)
         assert "run.mcap: got no key that fits r7 r1/stat, expected some of team/r1/command" in err
+
+
+def test_an_option_that_would_be_ignored_is_refused(small: Path, run_command: RunCommand) -> None:
+    for options, message in (
+        (("--every", "2", "**"), "--every: got no --rates beside it"),
+        (("--rates", "--full"), "--full: got --rates beside it"),
+        ((), "KEY: got none"),
+        (("--rates", "-n", "-1"), "-n: got -1"),
+    ):
+        status, _, err = run_command("echo", "--file", small, *options)
+        assert (status, err.count("\n")) == (2, 1)
+        assert err.startswith(f"quadriga: {message}")
 
 
 def test_a_run_folder_stands_for_its_recording(small: Path, run_command: RunCommand) -> None:
@@ -54,21 +66,26 @@ def test_a_run_folder_stands_for_its_recording(small: Path, run_command: RunComm
     )
 
 
-def test_hz_knows_rates_intervals_and_gaps(tmp_path: Path, run_command: RunCommand) -> None:
+def test_rates_are_those_of_keys_with_intervals_and_gaps(
+    tmp_path: Path, run_command: RunCommand
+) -> None:
     def change(key: str, message: msg.Message) -> msg.Message | None:
         return None if key == "team/r1/state" and 100 <= message.tick < 105 else message
 
     run = write(tmp_path, CONFIG, change=change) / "run.mcap"
-    _, lines, _ = run_command("hz", "r1", "sim/truth", "--file", run)
+    _, lines, _ = run_command("echo", "--rates", "r1", "sim/truth", "--file", run)
     rows = {line.split()[0]: re.split(r"  +", line) for line in lines[1:]}
     assert rows["team/r1/state"][1:] == ["596", "991.7", "1 – 6", "495.8", "2.0 – 12.0", "5"]
     assert rows["team/sim/truth"][1:] == ["61", "100.0", "10 – 10", "50.0", "20.0 – 20.0", "0"]
     assert "team/r2/state" not in rows
 
 
-@pytest.mark.parametrize("verb", ["echo", "hz", "info", "check"])
+@pytest.mark.parametrize(
+    "words",
+    [("echo", "**", "--file"), ("echo", "--rates", "--file"), ("info",), ("info", "--check")],
+)
 def test_nothing_that_was_recorded_steers_the_terminal(
-    tmp_path: Path, run_command: RunCommand, verb: str
+    tmp_path: Path, run_command: RunCommand, words: tuple[str, ...]
 ) -> None:
     """Keys, names of robots and of counters, and prose, with sequences and lines of their own."""
     steer, path = "\x1b[2J\x9b31m\u202e\nquadriga: harmless", tmp_path / "run.mcap"
@@ -82,8 +99,7 @@ def test_nothing_that_was_recorded_steers_the_terminal(
             ("team/r1/inputs", msg.Consumed(1, 1, 0, 0, (steer,), (steer,))),
         ):
             writer.write(key, encode(message), 5)
-    options = ("**", "--file") if verb == "echo" else ("--file",) if verb == "hz" else ()
-    _, lines, err = run_command(verb, *options, path)
+    _, lines, err = run_command(*words, path)
     assert lines
     assert not re.search("[\x1b\x9b\u202e]", "".join(lines) + err)
     assert not [line for line in lines if line.startswith("quadriga: harmless")]

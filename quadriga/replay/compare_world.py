@@ -1,4 +1,4 @@
-"""SHELL of `quadriga resim`: a bar while the world is recomputed, then the verdict."""
+"""SHELL of `quadriga replay --world`: a bar while the world is recomputed, then the verdict."""
 
 from __future__ import annotations
 

@@ -25,8 +25,8 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_lockstep(tmp_path_factory.mktemp("whole") / "run.mcap", config())
 
 
-def resim(capsys: pytest.CaptureFixture[str], path: Path) -> tuple[int, str]:
-    status = main(["resim", str(path)])
+def compare(capsys: pytest.CaptureFixture[str], path: Path) -> tuple[int, str]:
+    status = main(["replay", "--world", str(path)])
     out, err = capsys.readouterr()
     assert "Traceback" not in err
     return status, out + err
@@ -35,7 +35,7 @@ def resim(capsys: pytest.CaptureFixture[str], path: Path) -> tuple[int, str]:
 def test_a_world_with_pushes_payload_and_blocks_comes_out_equal(
     capsys: pytest.CaptureFixture[str], whole: Path
 ) -> None:
-    status, output = resim(capsys, whole)
+    status, output = compare(capsys, whole)
     assert status == 0, output
     assert f"equal to the byte: {2 * TICKS + TICKS // 10} states and truths" in output
     assert "× real time" in output
@@ -50,7 +50,7 @@ def test_loose_stones_and_weak_motors_come_out_equal(
         world__push_force=60.0,
         world__push_every=0.1,
     )
-    status, output = resim(capsys, write_lockstep(tmp_path / "run.mcap", scene))
+    status, output = compare(capsys, write_lockstep(tmp_path / "run.mcap", scene))
     assert status == 0, output
     assert f"equal to the byte: {2 * TICKS + TICKS // 10} states and truths" in output
 
@@ -88,7 +88,7 @@ DELAY = config().motors.delay_ms
 def test_one_flipped_bit_is_found_at_its_tick(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, change: Change, tick: int, found: str
 ) -> None:
-    status, output = resim(capsys, write_lockstep(tmp_path / "run.mcap", config(), change))
+    status, output = compare(capsys, write_lockstep(tmp_path / "run.mcap", config(), change))
     assert status == 1
     assert f"first difference: tick {tick}, " in output
     assert found in output
@@ -104,7 +104,7 @@ def test_a_difference_names_the_versions_that_may_explain_it(
     elsewhere = rewritten(
         path, tmp_path / "elsewhere.mcap", metadata={"versions": json.dumps(versions)}
     )
-    _, output = resim(capsys, elsewhere)
+    _, output = compare(capsys, elsewhere)
     assert "other versions, which may be why: mujoco 3.1.4 (here " in output
 
 
@@ -127,7 +127,7 @@ def test_a_recording_with_gaps_is_one_clear_error(
     path = write_lockstep(
         tmp_path / "run.mcap", config(), lambda t, key, payload: None if lose(t, key) else payload
     )
-    status, output = resim(capsys, path)
+    status, output = compare(capsys, path)
     assert status == 2
     assert message in output
     assert output.count("\n") == 1
@@ -138,7 +138,7 @@ def test_a_cut_recording_is_compared_up_to_the_cut(
 ) -> None:
     content = whole.read_bytes()
     (tmp_path / "cut.mcap").write_bytes(content[: len(content) // 2])
-    status, output = resim(capsys, tmp_path / "cut.mcap")
+    status, output = compare(capsys, tmp_path / "cut.mcap")
     assert status == 2
     assert "equal to the byte: " in output
     assert "compared up to there only: " in output
@@ -150,16 +150,21 @@ def test_what_is_not_lockstep_or_not_used_is_refused(
     capsys: pytest.CaptureFixture[str], whole: Path, tmp_path: Path
 ) -> None:
     path = write_lockstep(tmp_path / "run.mcap", config(world__mode="realtime"))
-    status, output = resim(capsys, path)
+    status, output = compare(capsys, path)
     assert (status, output.count("\n")) == (2, 1)
     assert "got a walk in real time, expected one in lock-step" in output
     own = config(team__plant="puppet")
-    status, output = resim(capsys, write_lockstep(tmp_path / "own.mcap", own))
+    status, output = compare(capsys, write_lockstep(tmp_path / "own.mcap", own))
     assert status == 2
     assert "team.plant_per_robot false, expected a walk in one simulated world" in output
-    assert main(["resim", str(whole), "--seed", "4"]) == 2
-    assert "got --seed, expected an option that it has" in capsys.readouterr().err
-    assert main(["resim", str(tmp_path / "none.mcap")]) == 2
+    for option, value, told in (
+        ("--seed", "4", "got world.seed, expected none of the configuration"),
+        ("--from", "0.1", "--from: got --world beside it, expected one of the two"),
+        ("--out", str(tmp_path), "--out: got --world beside it"),
+    ):
+        assert main(["replay", "--world", str(whole), option, value]) == 2
+        assert told in capsys.readouterr().err
+    assert main(["replay", "--world", str(tmp_path / "none.mcap")]) == 2
 
 
 def test_ticks_come_in_order_with_all_their_entries(whole: Path) -> None:
