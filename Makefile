@@ -9,7 +9,7 @@ MANUAL := $(VENV)/.manual
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 ARGS ?=
 
-.PHONY: install tools walk prepared test nightly test-containers image-lock sbom lint endurance format docs dist pages manual links gallery figures clip acceptance bench bench-against
+.PHONY: install tools walk prepared check test nightly test-containers image-lock sbom lint endurance format docs dist pages manual links gallery figures clip acceptance bench bench-against
 
 install: $(STAMP)
 
@@ -41,6 +41,11 @@ walk: $(STAMP)
 prepared: $(TOOLS)
 	$(BIN)/python -m compileall -q quadriga agents bridges plant shared sim_server tests
 	$(BIN)/quadriga prepare --robots 2 --set identification.seconds=60
+
+# What to run at every change: linters, and the tests of what was changed since the last commit.
+check: lint
+	tests=$$($(BIN)/python -m tests.changed) && { [ -z "$$tests" ] || \
+		$(BIN)/python -m pytest -m "not nightly" --numprocesses 2 --dist loadfile $$tests; }
 
 # Three workers on two cores: most tests wait for processes most of their time.
 # Files are taken in the order of tests/conftest.py. Whoever tests is not started again after a test
