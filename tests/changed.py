@@ -21,7 +21,7 @@ def _ask_git(*words: str) -> list[str]:
     return done.stdout.splitlines()
 
 
-def tests_of(changed: Path) -> list[Path]:
+def find_tests(changed: Path) -> list[Path]:
     """The test file of a module, else all of the folder that has the tests of its package."""
     if changed.suffix != ".py" or not changed.parts[:-1]:
         return []
@@ -36,4 +36,4 @@ def tests_of(changed: Path) -> list[Path]:
 
 
 if __name__ == "__main__":
-    print(*sorted({test for changed in changed_files() for test in tests_of(changed)}))
+    print(*sorted({test for changed in changed_files() for test in find_tests(changed)}))

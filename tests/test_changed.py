@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.changed import TOP, tests_of
+from tests.changed import TOP, find_tests
 
 
 @pytest.mark.parametrize(
@@ -20,13 +20,13 @@ from tests.changed import TOP, tests_of
     ],
 )
 def test_a_module_has_its_test_file(changed: str, expected: list[str]) -> None:
-    assert tests_of(Path(changed)) == [Path(test) for test in expected]
+    assert find_tests(Path(changed)) == [Path(test) for test in expected]
 
 
 def test_a_module_without_one_has_those_of_its_package() -> None:
     module = Path("shared/link/plant_end.py")
     assert (TOP / module).is_file()
     assert not (TOP / "tests/shared/link/test_plant_end.py").exists()
-    found = tests_of(module)
+    found = find_tests(module)
     assert Path("tests/shared/link/test_ticks.py") in found
     assert all((TOP / test).is_file() for test in found)
