@@ -25,7 +25,7 @@ BUDGETS: Final[Mapping[str, int]] = {
     "shared": 8_832,  # planned: 7,200; left: Unitree's protocols, the barrier; came: the plant link
     "quadriga": 39_063,  # planned: 18,200; left: harnesses of experiments, report, commands
     "benchmarks": 2_079,  # planned: 1,800; left: plans as the paper writes them, endurance
-    "tests": 45_443,  # planned: 28,000; came: what a stranger packs, the release
+    "tests": 45_444,  # planned: 28,000; came: what a stranger packs, the release
 }
 COUNTED: Final = (".py", ".js", ".css", ".html")
 MOST_ARGUMENTS: Final = 8
